@@ -9,11 +9,11 @@ from lerobot.cameras import Camera
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
 
 from gelslim_force.frames.source import open_frames
+from gelslim_force.outputs.tactile_features import Features, ForceGrid, TactileFeatures
 from gelslim_force.sensor import open_sensor
 from gelslim_force.tracking.drift_filter import TareRecord
 from lerobot_camera_gelslim.config_gelslim import GelslimCameraConfig
 from lerobot_camera_gelslim.sensor_stream import Picture, Reading, SensorStream
-from lerobot_camera_gelslim.tactile_features import Features, ForceGrid, TactileFeatures
 
 _FIRST_PICTURE_S = 10.0
 """A camera may take seconds to start, and the pipeline compiles with its first frame."""

@@ -14,8 +14,8 @@ from typing import Any
 from lerobot.configs.types import PipelineFeatureType
 from lerobot.processor import ObservationProcessorStep, ProcessorStepRegistry
 
+from gelslim_force.outputs.tactile_features import SCALARS, scalars
 from lerobot_camera_gelslim.camera import GelslimCamera
-from lerobot_camera_gelslim.tactile_features import SCALARS, scalars
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Results of the force pipeline as arrays of fixed shapes. Needs no LeRobot."""
+"""Results of the force pipeline as arrays of fixed shapes, as learning takes them."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ class ForceGrid:
     def carried(self, force_n: Array) -> Array:
         """(rows, columns, 3) forces in N for those of the nodes (c, 3); NaN stays unknown."""
         count = self.shape[0] * self.shape[1]
-        parts = [
-            np.bincount(self._cells.ravel(), (self._shares * force_n[:, k]).ravel(), count)
-            for k in range(3)
-        ]
+        parts: list[Array] = []
+        for k in range(3):
+            shares = (self._shares * force_n[:, k]).ravel()
+            parts.append(np.bincount(self._cells.ravel(), shares, count).astype(np.float64))
         return np.stack(parts, axis=-1).reshape(*self.shape, 3)
 
 
