@@ -46,6 +46,11 @@ EXTRAS = (
     Extra("cluster", ("distributed",), "explore --scheduler: designs on a Dask cluster"),
     Extra("export", ("safetensors",), "bundle-export to safetensors"),
     Extra("zarr", ("zarr",), "dataset --format zarr: data sets as Zarr arrays"),
+    Extra(
+        "lerobot",
+        ("pyarrow", "cv2", "av"),
+        "dataset --format lerobot, also with videos",
+    ),
     Extra("sim", ("mujoco",), "examples/mujoco_grasp.py, in which a physics engine steps the twin"),
     Extra("torch", ("torch",), 'Twin.batch with backend="torch": many contacts at once'),
 )  # fmt: skip

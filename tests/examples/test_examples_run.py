@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-SLOW = ("frames_to_forces", "data_set", "mujoco_grasp")
-NEEDS = {"mujoco_grasp": "mujoco"}
+SLOW = ("frames_to_forces", "data_set", "mujoco_grasp", "train_regressor")
+NEEDS = {"mujoco_grasp": "mujoco", "train_regressor": "sklearn"}
 """Modules of extras without which an example is not tested."""
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
