@@ -19,6 +19,7 @@ from typing import Any
 
 import data_set_cost
 import force_sigma
+import learned_forces
 import linear_gel
 import twin_batch
 import twin_fine
@@ -85,6 +86,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "drawn-light": _from("drawn_light", drawn_light_table.table),
     },
     "docs/data_sets.md": {"data-set-cost": _from("data_set_cost", data_set_cost.table)},
+    "docs/train.md": {"learned-forces": _from("learned_forces", learned_forces.table)},
     "docs/twin_steps.md": {
         "steps": _from("twin_steps", twin_steps.table),
         "batch": twin_batch.page_table,

@@ -50,6 +50,8 @@ STEPS = (
     Step("twin_steps"),
     Step("twin_batch"),
     Step("twin_fine"),
+    Step("learned_forces", quick=None),
+    Step("robot_observation", quick=None, writes=False),
     Step("twin_skin"),
     Step("linear_gel"),
     Step("twin_look", quick=None, writes=False),

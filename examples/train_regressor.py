@@ -3,7 +3,7 @@
 #
 # A data set of pictures with true forces is made for a few built sensors, which differ from one another as
 # fingers of one design do. A small network learns where a ball touches and how hard it pushes. It is judged
-# on other sensors, whose gel, light and camera it has never seen.
+# on other sensors.
 #
 # The libraries are in the extras `record` and `vision`, and scikit-learn. The numbers of samples are arguments:
 # `python train_regressor.py 2000 300 out/touches`.
@@ -31,8 +31,8 @@ folder = Path(arguments[2] if len(arguments) > 2 else mkdtemp())
 folder.mkdir(parents=True, exist_ok=True)
 
 # %% [markdown]
-# The ranges below `vary` are what the network cannot know in advance. Light, gel and camera are drawn for each
-# built sensor; the seed decides which.
+# The ranges below `vary` are what the network cannot know in advance. The place of the camera is drawn for each
+# built sensor, all else for each sample, and the seed decides what: so another seed has other sensors.
 
 # %%
 SCENE = """\
