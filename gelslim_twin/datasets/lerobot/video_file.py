@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 
 from gelslim_core import optional_library
 from gelslim_core.errors import disk_error
+from gelslim_twin.datasets.formats import DataSetError
 
 _LOSSLESS = 100
 """Quality whose pictures are those that were written, bit for bit."""
 _WORST_CRF = 63
+_LEAST_PX = 32
+"""The encoder of AV1 ends the process for pictures of 16 px."""
+_LOSSLESS_OPTIONS = {"preset": "veryfast", "threads": "1"}
+_OPTIONS = {"preset": "10", "svtav1-params": "lp=1"}
+"""One thread, so that the bytes do not depend on the number of processors."""
 _GROUP = "2"
 """Frames from one key frame to the next: few, because training jumps to and fro."""
 
@@ -35,6 +41,7 @@ class VideoFile:
 
         Raises:
             MissingLibraryError: PyAV is not installed.
+            DataSetError: PyAV was built without the encoder.
             OutputError: The file cannot be made.
         """
         self._av = library()
@@ -42,17 +49,33 @@ class VideoFile:
         lossless = quality >= _LOSSLESS
         crf = 0 if lossless else round(_WORST_CRF * (1 - quality / _LOSSLESS))
         codec, self._pixels = ("libx264rgb", "rgb24") if lossless else ("libsvtav1", "yuv420p")
-        options = {"crf": str(crf), "g": _GROUP, "preset": "veryfast" if lossless else "10"}
+        self._least_px = 1 if lossless else _LEAST_PX
+        options = {"crf": str(crf), "g": _GROUP, **(_LOSSLESS_OPTIONS if lossless else _OPTIONS)}
+        rate = Fraction(frames_per_s).limit_denominator(1001)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = self._av.open(str(path), "w")
+            self._stream = self._file.add_stream(codec, rate, options=options)
         except OSError as error:
             raise disk_error(path, "starting the video", error) from error
-        rate = Fraction(frames_per_s).limit_denominator(1001)
-        self._stream = self._file.add_stream(codec, rate, options=options)
+        except ValueError as error:
+            raise DataSetError(
+                f"PyAV has no encoder {codec} here ({error}); install its wheel with `pip install "
+                "av`, or write single pictures with --pictures png"
+            ) from error
 
     def append(self, picture: NDArray[np.uint8]) -> None:
-        """Add a picture (h, w, 3). Raises OutputError."""
+        """Add a picture (h, w, 3).
+
+        Raises:
+            DataSetError: It is too small for the encoder.
+            OutputError: The disk refuses it.
+        """
+        if min(picture.shape[:2]) < self._least_px:
+            raise DataSetError(
+                f"pictures of {picture.shape[1]} x {picture.shape[0]} px: videos with losses need "
+                f"{self._least_px} px at least; write --quality {_LOSSLESS} or --pictures png"
+            )
         self._stream.height, self._stream.width = picture.shape[:2]
         self._stream.pix_fmt = self._pixels
         self._write(self._av.VideoFrame.from_ndarray(picture, format="rgb24"))
@@ -84,6 +107,6 @@ def video_problem(path: Path) -> str:
         with av.open(str(path)) as file:
             for _ in file.decode(video=0):
                 pass
-    except (OSError, IndexError) as error:
-        return str(error)
+    except (OSError, ValueError, IndexError) as error:
+        return getattr(error, "strerror", "") or str(error)
     return ""

@@ -19,6 +19,7 @@ from PIL import Image
 
 from gelslim_twin.datasets.formats import DataSetError, Pictures, Shard, format_named
 from gelslim_twin.datasets.labels import MEANING
+from gelslim_twin.datasets.lerobot.video_file import VideoFile
 from gelslim_twin.datasets.sample import Sample, SampleFrame, Split
 
 POSE = tuple(name for name in MEANING if name.startswith("tool_"))
@@ -186,6 +187,27 @@ def test_damaged_files_are_told(tmp_path: Path) -> None:
     for broken in (bytes(data), bytes(data[: len(data) // 2]), b""):
         file.write_bytes(broken)
         assert made.problem(file)
+
+
+@pytest.mark.slow
+def test_videos_repeat_their_bytes_and_small_ones_are_refused(tmp_path: Path) -> None:
+    pytest.importorskip("av", reason="NOT TESTED: videos of data sets need PyAV")
+    for kind in ("lossless video", "video"):
+        files = []
+        for turn in ("first", "second"):
+            folder = tmp_path / kind / turn
+            folder.mkdir(parents=True)
+            written(folder, KINDS[kind])
+            files.append(sorted((folder / "videos").rglob("*.mp4")))
+        assert len(files[0]) == 3
+        for one, other in zip(*files, strict=True):
+            assert one.read_bytes() == other.read_bytes()
+            assert format_named("lerobot").problem(one) == ""
+            one.write_bytes(one.read_bytes()[:100])
+            assert format_named("lerobot").problem(one)
+    small = VideoFile(tmp_path / "small.mp4", 10, 60)
+    with pytest.raises(DataSetError, match="16 x 16"):
+        small.append(np.zeros((16, 16, 3), dtype=np.uint8))
 
 
 def loaded(folder: Path) -> Any:
