@@ -237,8 +237,8 @@ def _complete_format(job: DataSetJob, wanted: Sequence[Shard], about: dict[str, 
     try:
         format_named(job.format).complete(work, job.out_folder, wanted, about)
         files = moved(work, job.out_folder)
-        about["format_files"] = sorted(files)
-        rehash(job.out_folder, [shard.name for shard in wanted], files)
+        names = [shard.name for shard in wanted]
+        about["format_files"] = rehash(job.out_folder, names, files)
     finally:
         shutil.rmtree(work, ignore_errors=True)
 

@@ -138,14 +138,18 @@ def read_record(path: Path) -> ShardRecord | None:
         return None
 
 
-def rehash(dataset: Path, names: Sequence[str], files: Mapping[str, FileHash]) -> None:
+def rehash(dataset: Path, names: Sequence[str], files: Mapping[str, FileHash]) -> list[str]:
     """Note in the records of shards which of their files a format has written again.
 
     Args:
         dataset: The data set.
         names: Names of the shards.
         files: Hashes of what was written, by path.
+
+    Returns:
+        What was written and belongs to no shard.
     """
+    free = set(files)
     parquet = load("pyarrow.parquet", PURPOSE)
     for name in names:
         path = record_path(dataset, name)
@@ -153,11 +157,13 @@ def rehash(dataset: Path, names: Sequence[str], files: Mapping[str, FileHash]) -
         changed = {} if record is None else {n: files[n] for n in record.files if n in files}
         if record is None or not changed:
             continue
+        free -= set(changed)
         record = replace(record, files={**record.files, **changed})
         table = parquet.read_table(path).replace_schema_metadata({_META: record.to_json()})
         stream = io.BytesIO()
         parquet.write_table(table, stream, compression="zstd")
         replace_file(path, stream.getvalue())
+    return sorted(free)
 
 
 class NothingMadeError(DataSetError):

@@ -149,8 +149,7 @@ def _merged(
     inner.mkdir()
     format_named(about["file_format"]).complete(inner, work, wanted, about)
     files = moved(inner, work)
-    about["format_files"] = sorted(files)
-    rehash(work, [shard.name for shard in wanted], files)
+    about["format_files"] = rehash(work, [shard.name for shard in wanted], files)
     shutil.rmtree(inner)
     answer = {**about, **counted(work, wanted)}
     replace_file(work / MANIFEST, json_bytes(answer))

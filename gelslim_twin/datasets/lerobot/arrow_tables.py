@@ -44,16 +44,37 @@ def frame_table(
         columns: Values (t, ...) of those that are no pictures.
         pictures: The t encoded pictures of the column of type `image`; empty without one.
     """
-    pa = arrow()
-    made = {}
-    for name, feature in features.items():
-        if feature.dtype == "image":
+    pa, schema = arrow(), frame_schema(features)
+    made = []
+    for field in schema:
+        if features[field.name].dtype == "image":
             entries = [{"bytes": data, "path": None} for data in pictures]
-            kind = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
-            made[name] = pa.array(entries, type=kind)
-        elif feature.dtype != "video":
-            made[name] = _array(columns[name], feature)
-    return pa.table(made)
+            made.append(pa.array(entries, type=field.type))
+        else:
+            made.append(_array(columns[field.name], features[field.name]))
+    return pa.table(made, schema=schema)
+
+
+def frame_schema(features: Mapping[str, Feature]) -> Any:
+    """Columns and types of a table of frames; a video has none."""
+    pa = arrow()
+    return pa.schema([(n, _type(f)) for n, f in features.items() if f.dtype != "video"])
+
+
+def _type(feature: Feature) -> Any:
+    pa = arrow()
+    if feature.dtype == "image":
+        return pa.struct([("bytes", pa.binary()), ("path", pa.string())])
+    if feature.dtype == "string":
+        return pa.string()
+    kind = pa.from_numpy_dtype(np.dtype(feature.dtype))
+    if feature.shape == (1,):
+        return kind
+    if len(feature.shape) == 1:
+        return pa.list_(kind, feature.shape[0])
+    for _ in feature.shape:
+        kind = pa.list_(kind)
+    return kind
 
 
 def tasks_table(tasks: list[str]) -> Any:

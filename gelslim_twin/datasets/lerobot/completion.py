@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from gelslim_core.files.replaced_file import json_bytes
 from gelslim_twin.datasets.formats import DataSetError, Shard
 from gelslim_twin.datasets.lerobot import places, statistics
-from gelslim_twin.datasets.lerobot.arrow_tables import arrow, parquet, parquet_writer, tasks_table
+from gelslim_twin.datasets.lerobot.arrow_tables import (
+    arrow,
+    frame_schema,
+    parquet,
+    parquet_writer,
+    tasks_table,
+)
 from gelslim_twin.datasets.lerobot.features import (
     PICTURE,
     RENUMBERED,
@@ -130,14 +136,16 @@ def _renumber(folder: Path, dataset: Path, written: WrittenShard) -> None:
         found = file.read(list(RENUMBERED))
         if all(np.array_equal(found[name].to_numpy(), right[name]) for name in RENUMBERED):
             return
-        with parquet_writer(folder / place, file.schema_arrow) as target:
+        # The schema of a file that was read has notes that one just written has not.
+        schema = frame_schema({**written.features, **counter_features()})
+        with parquet_writer(folder / place, schema) as target:
             row = 0
             for number in range(file.num_row_groups):
                 table = file.read_row_group(number)
                 for name in RENUMBERED:
                     values = arrow().array(right[name][row : row + len(table)])
                     table = table.set_column(table.column_names.index(name), name, values)
-                target.write_table(table)
+                target.write_table(arrow().table(table.columns, schema=schema))
                 row += len(table)
 
 

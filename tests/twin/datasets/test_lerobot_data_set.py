@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -30,16 +31,25 @@ seed: {seed}
 """
 
 
-def made(folder: Path, count: int, seed: int = 7) -> dict[str, Any]:
+def made(folder: Path, count: int, seed: int = 7, name: str = "set") -> dict[str, Any]:
     """A data set with every second frame, in shards of two samples."""
-    for name, text in example("mini20").files("finger").items():
-        (folder / name).write_text(text, encoding="utf-8")
+    for file, text in example("mini20").files("finger").items():
+        (folder / file).write_text(text, encoding="utf-8")
     scene = folder / f"touches_{seed}.yaml"
     scene.write_text(SCENE.format(seed=seed), encoding="utf-8")
     return gelslim.data_set(
-        scene, folder / f"set_{seed}", count=count, file_format="lerobot", frames="every:2",
+        scene, folder / f"{name}_{seed}", count=count, file_format="lerobot", frames="every:2",
         frames_per_shard=6,
     )  # fmt: skip
+
+
+def hashes(folder: Path) -> dict[str, str]:
+    """Hash of each file below a folder."""
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
 def read(folder: Path) -> Any:
@@ -62,6 +72,9 @@ def test_a_data_set_grows_is_merged_and_is_read(tmp_path: Path) -> None:
         ]
         assert [r["index"] for r in rows] == list(range(about["frames"]))
         assert [r["episode_index"] for r in rows] == np.repeat(range(count), 3).tolist()
+    made(tmp_path, 6, name="at_once")
+    grown, at_once = (hashes(tmp_path / name) for name in ("set_7", "at_once_7"))
+    assert grown == at_once
     made(tmp_path, 2, seed=8)
     merged = merge_data_sets([tmp_path / "set_7", tmp_path / "set_8"], tmp_path / "both")
     assert merged["samples"] == 8
