@@ -10,6 +10,7 @@ The data sets stay in out/learned_forces and are made once. Needs scikit-learn.
 from __future__ import annotations
 
 import argparse
+import io
 import runpy
 import sys
 from pathlib import Path
@@ -70,7 +71,7 @@ def table(data: dict[str, Any]) -> str:
         name = row["samples"] or "none: always the mean"
         lines.append(
             f"| {name} | {row['place_mm']:.2f} mm ({row['place_95_mm']:.2f} mm) | "
-            f"{row['force_n']:.3f} N ({row['force_95_n']:.3f} N) | {row['force_share']:.0%} |"
+            f"{row['force_n']:.3f} N ({row['force_95_n']:.3f} N) | {100 * row['force_share']:.0f} % |"
         )
     return "\n".join(lines)
 
@@ -99,7 +100,10 @@ def _draw(names: dict[str, Any], folder: Path, target: Path) -> None:
     force.set(title="normal force", xlabel="true, N", ylabel="found, N", aspect="equal")
     force.set(xlim=(0, most), ylim=(0, most))
     target.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(target, dpi=100)
+    with io.BytesIO() as file:
+        figure.savefig(file, dpi=100)
+        # 256 colours: the sensor's noise does not compress otherwise.
+        Image.open(file).convert("RGB").quantize(256).save(target, optimize=True)
 
 
 if __name__ == "__main__":
