@@ -69,9 +69,10 @@ def table(data: dict[str, Any]) -> str:
     ]
     for row in data["rows"]:
         name = row["samples"] or "none: always the mean"
+        share = 100 * row["force_share"]
         lines.append(
             f"| {name} | {row['place_mm']:.2f} mm ({row['place_95_mm']:.2f} mm) | "
-            f"{row['force_n']:.3f} N ({row['force_95_n']:.3f} N) | {100 * row['force_share']:.0f} % |"
+            f"{row['force_n']:.3f} N ({row['force_95_n']:.3f} N) | {share:.0f} % |"
         )
     return "\n".join(lines)
 
