@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from gelslim_optics.light.light_fans import STEEPEST
 from gelslim_optics.light.light_map import LightMap
+from gelslim_optics.light.relief import BIN_WIDTH, LATTICE_MM, fall_of_light, relief_of
+from gelslim_optics.light.relief_kernel import LOWEST, MOST, SMALLEST_MM, TOWARDS
 from gelslim_twin.batch.engine import Engine, Tensor
 from gelslim_twin.batch.surfaces import BatchedSurfaces
-from gelslim_twin.render.relief import BIN_WIDTH, LATTICE_MM, fall_of_light, relief_of
-from gelslim_twin.render.relief_kernel import LOWEST, MOST, SMALLEST_MM, TOWARDS
 from gelslim_twin.render.shading import NEAR_MM, ROUNDS, Shading
 from gelslim_twin.render.surface_kernel import BEYOND_CELLS
 from gelslim_twin.render.surroundings import Sight

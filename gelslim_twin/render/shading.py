@@ -3,8 +3,8 @@
 The coat is a Lambertian reflector. Light in the direction d (unit vector) gives the irradiance d·n
 on a surface with outward normal n, and none where d·n is negative (attached shadow). Traced light
 has its directions at each place, with what the coat has scattered back; see `LightFans`. Shadows
-that one part of the surface casts on another are those of `relief`. A further ambient share does
-not depend on the shape.
+that one part of the surface casts on another are those of `gelslim_optics.light.relief`. A further
+ambient share does not depend on the shape.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_optics.light.light_fans import STEEPEST
-from gelslim_twin.render.relief import relief_of
+from gelslim_optics.light.relief import LATTICE_MM, relief_of
 from gelslim_twin.render.surroundings import Sight
 
 if TYPE_CHECKING:
@@ -61,6 +61,28 @@ class Shading:
             0.0, gain,
         )  # fmt: skip
         if self.relief:
-            apply_relief(met, *relief_of(light).on(state, rest_mm), gain)
+            apply_relief(met, *relief_on(light, state, rest_mm), gain)
         gain += np.float32(self.ambient_share) * (1 - gain)
         return gain.reshape(*sight.rest_mm.shape[:2], light.sources)
+
+
+def relief_on(
+    light: LightMap, state: SurfaceState, rest_mm: Array | None
+) -> tuple[Array, Array, Array]:
+    """Light on a surface over that of its slopes alone.
+
+    Args:
+        light: On the untouched gel.
+        state: The surface.
+        rest_mm: Its height (ny, nx) at rest at the nodes of `state`; None for a level one.
+
+    Returns:
+        The factor (m, n, k) on a lattice, the lattice's first node (2,) and its steps (2,) in mm.
+    """
+    height = state.displacement_mm[..., 2]
+    if rest_mm is not None:
+        height = height - rest_mm
+    stride = max(1, round(LATTICE_MM / float(state.step_mm.min())))
+    step = stride * state.step_mm
+    height = np.ascontiguousarray(height[::stride, ::stride])
+    return relief_of(light).on(height, state.origin_mm, step), state.origin_mm, step

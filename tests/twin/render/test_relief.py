@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from gelslim_optics.light.light_map import LightMap
-from gelslim_twin.render.relief import BIN_WIDTH, Relief
+from gelslim_optics.light.relief import BIN_WIDTH
+from gelslim_twin.render.shading import relief_on
 from gelslim_twin.render.surface_state import SurfaceState
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ def beams(azimuth_deg: float, fall_per_mm: float = 0.0) -> LightMap:
 
 def relief(light: LightMap, height: Array, rest_mm: Array | None = None) -> Array:
     state = SurfaceState(AXIS, AXIS, np.stack([0 * height, 0 * height, height], axis=2))
-    factor, origin, step = Relief(light).on(state, rest_mm)
+    factor, origin, step = relief_on(light, state, rest_mm)
     assert origin == pytest.approx([AXIS[0], AXIS[0]])
     assert step == pytest.approx([STEP_MM, STEP_MM])
     return factor[..., 0]

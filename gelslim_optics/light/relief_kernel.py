@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from gelslim_twin.render.surface_kernel import COMPILED
-
+COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 TOWARDS = np.array(
     [
         [1, 0], [2, 1], [1, 1], [1, 2], [0, 1], [-1, 2], [-1, 1], [-2, 1],

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from gelslim_optics.light.light_map import LightMap
-    from gelslim_twin.render.surface_state import SurfaceState
 
 Array = NDArray[np.float64]
 BIN_WIDTH = 0.09
@@ -44,7 +43,7 @@ class Relief:
     @cached_property
     def bins(self) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Array]:
         """Count of bins that are not dark, and of each bin what `relief_light` asks for."""
-        from gelslim_twin.render.relief_kernel import TOWARDS
+        from gelslim_optics.light.relief_kernel import TOWARDS
 
         sums = self.sums
         count = (sums[..., 0] > _FAINT).sum(axis=-1)
@@ -66,32 +65,25 @@ class Relief:
         order = np.argsort(-share, axis=-1, kind="stable")
         return np.take_along_axis(growth, order, axis=3)
 
-    def on(self, state: SurfaceState, rest_mm: Array | None) -> tuple[Array, Array, Array]:
-        """Light on a surface over that of its slopes alone.
+    def on(self, height_mm: Array, origin_mm: Array, step_mm: Array) -> Array:
+        """Light (ny, nx, k) on a surface over that of its slopes alone.
 
         Args:
-            state: The surface.
-            rest_mm: Its height (ny, nx) at rest at the nodes of `state`; None for a level one.
-
-        Returns:
-            The factor (m, n, k) on a lattice, the lattice's first node (2,) and its steps (2,) in
-            mm.
+            height_mm: (ny, nx) over the untouched gel, at the nodes of a lattice.
+            origin_mm: (2,) first node along x and y.
+            step_mm: (2,) of the lattice.
         """
-        from gelslim_twin.render.relief_kernel import relief_light
+        from gelslim_optics.light.relief_kernel import relief_light
 
-        height = state.displacement_mm[..., 2]
-        if rest_mm is not None:
-            height = height - rest_mm
-        stride = max(1, round(LATTICE_MM / float(state.step_mm.min())))
-        height = np.ascontiguousarray(height[::stride, ::stride])
-        step, fans = stride * state.step_mm, self.light.light_fans
+        height = np.ascontiguousarray(height_mm)
+        fans = self.light.light_fans
         factor = np.empty((*height.shape, self.light.sources))
-        fall = fall_of_light(self.light, tuple(state.origin_mm), tuple(step), height.shape)
+        fall = fall_of_light(self.light, tuple(origin_mm), tuple(step_mm), height.shape)
         relief_light(
-            height, state.origin_mm, step, self.sums, *self.bins, fall, BIN_WIDTH,
+            height, origin_mm, step_mm, self.sums, *self.bins, fall, BIN_WIDTH,
             np.array(fans.lower_mm), np.array(fans.upper_mm), factor,
         )  # fmt: skip
-        return factor, state.origin_mm, step
+        return factor
 
 
 @lru_cache(maxsize=4)
