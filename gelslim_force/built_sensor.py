@@ -9,6 +9,7 @@ import numpy as np
 
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
+from gelslim_force.forces.finite_strain import law_of
 from gelslim_force.joint.light_calibration import LightCalibration, read_light_calibration
 from gelslim_force.presses.gel_calibration import (
     GelCalibration,
@@ -70,7 +71,7 @@ def built_gel(
         CalibrationError: The calibration belongs to another bundle.
         IfemError: No operator keeps the budget.
     """
-    law = (settings or PipelineSettings()).gel
+    law = law_of(bundle, (settings or PipelineSettings()).gel)
     made, moved = bundle, calibration
     if gel is None:
         found = specified_gel(bundle)

@@ -17,6 +17,7 @@ from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import NormalReading, NormalSource
 from gelslim_force.forces import frame_problems
 from gelslim_force.forces.contact_motion import ContactMotion
+from gelslim_force.forces.finite_strain import law_of
 from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.forces.frame_problems import FrameCheck
 from gelslim_force.forces.frame_result import FrameResult
@@ -123,6 +124,11 @@ class ForcePipeline:
     def operator_name(self) -> str:
         """Name of the surface operator in use."""
         return self._forces.direct.operator.name
+
+    @property
+    def gel_law(self) -> str:
+        """Law of the gel in use: `linear` where `auto` finds no neo-Hookean one for this pad."""
+        return law_of(self.bundle, self.settings.gel)
 
     def with_normal(self, normal: NormalSource | None) -> ForcePipeline:
         """A pipeline of the same sensor with another normal source, at rest.

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from gelslim_core.budget.budget import Budget
 from gelslim_force.forces.contact_forces import ContactForces
 from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
-from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm
+from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm, law_of
 from gelslim_force.motion.marker_motion import COMPENSATIONS, Compensation
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.tracking.drift_filter import DriftSettings
@@ -33,7 +33,8 @@ class PipelineSettings:
             per frame, by which the operator is chosen from the ladder measured in the bundle.
         compensation: How the apparent motion of pressed markers is corrected, see `marker_motion`.
         interpolation: From markers to surface nodes.
-        gel: Law of the gel; `auto` takes the neo-Hookean one from a tenth of the thickness on.
+        gel: Law of the gel; `auto` takes the neo-Hookean one from a tenth of the thickness on, and
+            stays linear for crowned pads and cut cells, which have no neo-Hookean law.
         force: How forces are estimated from the motion.
         noise_px: Standard deviation of a marker's position; None estimates it in each frame.
         unknown_normal_mm: Depth in mm that may remain unnoticed without a normal source. Its
@@ -117,7 +118,7 @@ class PipelineSettings:
 
     def law(self, bundle: Bundle, operator: SurfaceOperator) -> FiniteStrainForce | DepthLaw | None:
         """The law of the gel, where it is not that of the operator alone."""
-        if self.gel == "linear":
+        if law_of(bundle, self.gel) == "linear":
             return None
         strained = FiniteStrainForce(bundle)
         if self.gel == "neo_hookean":

@@ -130,6 +130,15 @@ def deep_mm(bundle: Bundle) -> float:
     return float(DEEP_SHARE * bundle.mesh.layers * bundle.mesh.cell_size_mm[2])
 
 
+def law_of(bundle: Bundle, gel: str) -> str:
+    """The law of the gel that a setting gives: `auto` is `linear` for crowned pads and cut cells.
+
+    These have no neo-Hookean law; the standard deviations then hold what the linear one leaves out.
+    """
+    plain = bundle.mesh.fill is None and bundle.mesh.surface_shift is None
+    return gel if gel != "auto" or plain else "linear"
+
+
 class Anderson:
     """Anderson acceleration of x <- x + step(x) (Walker and Ni 2011, type II)."""
 

@@ -19,12 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
+from gelslim_force.joint.fit_state import FitState, FrameData
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
-from gelslim_force.joint.marker_rows import MarkerRows, apparent_mm
+from gelslim_force.joint.marker_rows import MarkerRows, apparent_mm, rms_length
 from gelslim_force.joint.model_errors import at_edge, by_region, edge_nodes
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
+from gelslim_force.joint.node_relief import NodeRelief
 from gelslim_force.joint.normal_equations import NormalEquations, huber
 from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes
@@ -41,6 +44,8 @@ Nodes = NDArray[np.intp]
 _MARKER_LIMIT = 3.0
 """Standard deviations beyond which a marker counts linearly."""
 _LEAST_NODES = 3
+_SETTLED = 0.01
+"""Change of the force, relative to it, after which another linearisation changes little."""
 _LEAST_ACROSS = 0.1
 """Sensitivity, or difference of those of two channels, that shows a slope across."""
 
@@ -99,6 +104,8 @@ class JointEstimator:
         strained: Another law of the gel, from motion (c, 3) to forces (c, 3), and None for the
             linear one.
         strained_from_mm: Depth from which it is used.
+        relief: What the heights of a deep dent do to its light; None without directions of light.
+        deep_mm: Depth from which a contact is deep.
     """
 
     points_mm: Array
@@ -119,6 +126,8 @@ class JointEstimator:
     off_design: OffDesign | None = None
     strained: Any = None
     strained_from_mm: float = 0.0
+    relief: NodeRelief | None = None
+    deep_mm: float = math.inf
 
     def estimate(
         self,
@@ -142,15 +151,15 @@ class JointEstimator:
             IfemError: The strained law does not converge.
         """
         seen = None if self.light is None else self.light.look(image, markers_px)
-        frame = _Frame(seen, markers_px, noise_px)
+        frame = FrameData(seen, markers_px, noise_px)
         region = self._region(frame)
         if region.sum() < _LEAST_NODES:
             return None
         if last is None or not (last.region & region).any():
             still = np.zeros_like(self.points_mm)
-            begun = self._rounds(frame, region, _State(still, still, 1.0), self.settings.rounds)
+            begun = self._rounds(frame, region, FitState(still, still, 1.0), self.settings.rounds)
         else:
-            begun = last.region, _State(last.force_n, last.displacement_mm, last.gain)
+            begun = last.region, FitState(last.force_n, last.displacement_mm, last.gain)
             if is_new_contact(region, last.seen, self.lattice):
                 begun = self._rounds(frame, region, begun[1], self.settings.rounds)
         nodes = region & self.lattice.widened(begun[0], 1)
@@ -166,18 +175,29 @@ class JointEstimator:
         return self._shown(None if self.light is None else self.light.look(image, markers_px))
 
     def _rounds(
-        self, frame: _Frame, nodes: Mask, state: _State, rounds: tuple[int, ...]
-    ) -> tuple[Mask, _State]:
+        self, frame: FrameData, nodes: Mask, state: FitState, rounds: tuple[int, ...]
+    ) -> tuple[Mask, FitState]:
         wider = None
         for number, count in enumerate(rounds):
             if number > 0:
                 wider = state.force_n
                 pressure = -state.force_n[:, 2] / self.area_mm2
-                least = self.settings.least_pressure
+                least = settings_at(self.settings, self._deepness(state)).least_pressure
                 nodes = pressing_nodes(nodes, pressure, self.neighbours, least)
             for _ in range(count):
                 state = self._round(frame, np.flatnonzero(nodes), state)
-        return nodes, replace(state, wider_n=wider)
+        return nodes, replace(self._settled(frame, nodes, state), wider_n=wider)
+
+    def _settled(self, frame: FrameData, nodes: Mask, state: FitState) -> FitState:
+        """A deep contact after as many more linearisations as it needs."""
+        for _ in range(self.settings.deep_rounds if self._deepness(state) > 0 else 0):
+            before, state = state, self._round(frame, np.flatnonzero(nodes), state)
+            if state.near(before, _SETTLED):
+                break
+        return state
+
+    def _deepness(self, state: FitState) -> float:
+        return deepness(state.displacement_mm, self.deep_mm)
 
     @cached_property
     def _mm_per_px(self) -> Array:
@@ -189,7 +209,7 @@ class JointEstimator:
         """(6, c, 3) whose products with forces are force and torque about the origin."""
         return np.asarray(rigid_motions(self.points_mm))
 
-    def _region(self, frame: _Frame) -> Mask:
+    def _region(self, frame: FrameData) -> Mask:
         """(c,) nodes that the frame shows as possibly in contact."""
         if self.light is not None and frame.seen is not None:
             rise = self._rise(self.light, frame.seen)
@@ -211,11 +231,11 @@ class JointEstimator:
             return None
         return np.asarray(-np.sign(falling) * change)
 
-    def _noise_mm(self, frame: _Frame) -> Array:
+    def _noise_mm(self, frame: FrameData) -> Array:
         """(n,) standard deviation of the markers' places on the gel by the noise of the image."""
         return frame.noise_px * self._mm_per_px
 
-    def _round(self, frame: _Frame, nodes: Nodes, state: _State) -> _State:
+    def _round(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
         """Linearise at the state, and solve."""
         start, offset = state.force_n[nodes].ravel(), self._offset(state)
         moved = self.responses.displacement(nodes, state.force_n[nodes]) + offset
@@ -224,16 +244,17 @@ class JointEstimator:
         markers = self._marker_rows(frame, near, moved)
         equations = NormalEquations.of(len(start))
         equations = equations.with_rows(markers.rows, markers.residual, markers.weight)
-        light = self._light(frame, near, moved, state.gain)
+        light = self._light(frame, near, moved, state)
         if light is not None:
             heights = self.responses.of_heights(nodes, light.nodes)
             equations = equations.with_light(light, heights, (1 - state.gain, chosen.gain_sigma))
-        young = self.youngs_modulus_mpa
+        young, area = self.youngs_modulus_mpa, self.area_mm2[nodes]
+        pressure = -state.force_n[nodes, 2] / area
         equations = equations.with_prior(
             start,
             self.lattice.adjacent(nodes),
-            self.area_mm2[nodes],
-            chosen.roughness * young,
+            area,
+            roughness_mpa(chosen, self._deepness(state), young, pressure),
             chosen.normal_stress * young,
             chosen.tangential_stress * young,
         )
@@ -242,12 +263,12 @@ class JointEstimator:
         force[nodes] = found.reshape(-1, 3)
         motion = self.responses.displacement(nodes, force[nodes]) + offset
         if light is None:
-            return _State(force, motion, state.gain, equations, markers)
+            return FitState(force, motion, state.gain, equations, markers)
         higher = np.asarray(heights @ (found - start).astype(heights.dtype), dtype=float)
         gain = light.gain_after(higher, chosen.gain_sigma)
-        return _State(force, motion, gain, equations, markers, light.unexplained(higher))
+        return FitState(force, motion, gain, equations, markers, light.unexplained(higher))
 
-    def _offset(self, state: _State) -> Array:
+    def _offset(self, state: FitState) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
         depth = -float(state.displacement_mm[:, 2].min(initial=0.0))
         if self.strained is None or depth <= self.strained_from_mm:
@@ -255,7 +276,7 @@ class JointEstimator:
         whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
         return np.asarray(state.displacement_mm - whole)
 
-    def _marker_rows(self, frame: _Frame, near: Mask, moved_mm: Array) -> MarkerRows:
+    def _marker_rows(self, frame: FrameData, near: Mask, moved_mm: Array) -> MarkerRows:
         """The markers near the contact: lateral motion by the picture and the height.
 
         What is not resolved: a share of the motion of all, and of each marker's `bending`.
@@ -267,28 +288,31 @@ class JointEstimator:
         used = np.flatnonzero(np.isfinite(lateral).all(axis=1))
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
         residual = (lateral[used] - model[used, :2]).ravel()
-        share = self.settings.marker_share * _size(model[used])
+        share = self.settings.marker_share * rms_length(model[used])
         bent = apparent_mm((self.bending @ moved_mm)[used], self.by_height[used])
         noise = np.hypot(self._noise_mm(frame)[used], self.settings.bending_share * bent)
         sigma = np.repeat(np.sqrt(self.settings.marker_mm**2 + share**2 + noise**2), 2)
         return MarkerRows(used, rows, residual, huber(residual, sigma, _MARKER_LIMIT))
 
-    def _light(self, frame: _Frame, near: Mask, moved_mm: Array, gain: float) -> LightSums | None:
+    def _light(
+        self, frame: FrameData, near: Mask, moved_mm: Array, state: FitState
+    ) -> LightSums | None:
         """The change of light near the contact, linear about the present motion (c, 3)."""
         if self.light is None or self.law is None or frame.seen is None:
             return None
         wide = self.lattice.widened(near, self.settings.light_reach)
-        bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide)
-        unresolved = self.settings.light_share * _size(bins.change.T)
-        error = math.hypot(self.settings.light_error, unresolved)
-        return bins.sums(self.law, moved_mm[:, 2], gain, error)
+        relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
+        bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide, relief)
+        chosen = settings_at(self.settings, self._deepness(state))
+        error = math.hypot(chosen.light_error, chosen.light_share * rms_length(bins.change.T))
+        return bins.sums(self.law, moved_mm[:, 2], state.gain, error)
 
     @cached_property
     def _near_edge(self) -> Mask:
         """(c,) nodes at the edge of the gel."""
         return edge_nodes(self.neighbours.sum(axis=1), self.lattice)
 
-    def _found(self, frame: _Frame, seen: Mask, region: Mask, state: _State) -> JointForces:
+    def _found(self, frame: FrameData, seen: Mask, region: Mask, state: FitState) -> JointForces:
         assert state.equations is not None
         assert state.markers is not None
         nodes = np.flatnonzero(region)
@@ -324,26 +348,3 @@ class JointEstimator:
         if self.light is None or seen is None:
             return np.zeros(count, dtype=bool)
         return self.light.shown(seen, count)
-
-
-@dataclass(frozen=True, eq=False)
-class _Frame:
-    seen: SeenLight | None
-    markers_px: Array
-    noise_px: float
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    force_n: Array
-    displacement_mm: Array
-    gain: float
-    equations: NormalEquations | None = None
-    markers: MarkerRows | None = None
-    unexplained: float = 0.0
-    wider_n: Array | None = None
-
-
-def _size(rows: Array) -> float:
-    """Root mean square of the lengths of vectors (n, k); 0 without any."""
-    return float(np.sqrt((rows**2).sum(axis=1).mean())) if len(rows) else 0.0

@@ -22,6 +22,8 @@ _WHOLLY = 0.999
 _PLACED = 3
 """Steps of the iteration for the place at rest."""
 _GAINS = 0.3, 3.0
+_SHADED = 0.2
+"""Standard deviation of the mean over 1 mm² of what a shadow takes, over it: its edge moves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +88,7 @@ class PlacedBins:
         area_mm2: (n,).
         built: Gain of the light as calibrated, (c, n) or one number.
         independent: Share of the noise that neighbouring bins do not have in common.
+        relief: (k, n) direct light over that of the slopes alone; None where heights do not matter.
     """
 
     taps: SlopeTaps
@@ -97,6 +100,7 @@ class PlacedBins:
     area_mm2: Array
     built: Array | float = 1.0
     independent: float = 1.0
+    relief: Array | None = None
 
     def sums(self, law: LightLaw, height_mm: Array, gain: float, light_error: float) -> LightSums:
         """Sums over the data, linear about the present heights.
@@ -110,10 +114,14 @@ class PlacedBins:
         from gelslim_force.joint.light_kernel import slope_sums
 
         slope = self.taps.slopes(height_mm)
-        model, by_slope, by_gain = law.change(slope, self.share, self.level, gain * self.built)
+        gains = gain * self.built
+        model, by_slope, by_gain = law.change(slope, self.share, self.level, gains, self.relief)
         by_gain = by_gain * self.built
         residual = self.change - model
         sigma = np.hypot(light_error / np.sqrt(self.area_mm2), self.noise)
+        if self.relief is not None:
+            shaded = np.einsum("kcn,kn->cn", self.share, np.abs(1 - self.relief))
+            sigma = np.hypot(sigma, _SHADED * shaded / np.sqrt(self.area_mm2))
         weight = huber(residual, sigma, _LIMIT)
         # A model that is brighter than what saturates agrees with it.
         weight[self.saturated & (residual < 0)] = 0.0
@@ -140,9 +148,14 @@ class PlacedBins:
 
 
 def placed_bins(
-    view: LightView, seen: SeenLight, lattice: NodeLattice, displacement_mm: Array, near: Mask
+    view: LightView,
+    seen: SeenLight,
+    lattice: NodeLattice,
+    displacement_mm: Array,
+    near: Mask,
+    relief: Array | None = None,
 ) -> PlacedBins:
-    """The valid bins of a frame among the nodes `near` (c,).
+    """The valid bins of a frame among the nodes `near` (c,), with the `relief` (c, k) of the nodes.
 
     The line of sight of a bin meets the surface where it is now; the motion (c, 3) of the nodes
     leads from there to the place at rest. Slopes are those of the deformed surface.
@@ -170,6 +183,7 @@ def placed_bins(
         of(view.area_mm2),
         of(view.gain),
         seen.independent,
+        None if relief is None else lattice.values_at(relief, places).T,
     )
 
 

@@ -71,3 +71,8 @@ def apparent_mm(moved_mm: Array, by_height: Array) -> Array:
     """
     seen = moved_mm[:, :2] - by_height * moved_mm[:, 2:]
     return np.asarray(np.sqrt((seen**2).mean(axis=1)))
+
+
+def rms_length(rows: Array) -> float:
+    """Root mean square of the lengths of vectors (n, k); 0 without any."""
+    return float(np.sqrt((rows**2).sum(axis=1).mean())) if len(rows) else 0.0

@@ -30,11 +30,15 @@ class JointSettings:
             of the light.
         light_share: What the mesh does not resolve of the change of the light, as a share of its
             root mean square over the colours together.
+        deep_light_share: The same of a contact that is pressed in by a fifth of the thickness or
+            more, whose rims are steeper. Between a tenth and a fifth it grows from `light_share`.
         edge_share: What the mesh does not resolve of contacts at the edge of the gel, as a share of
             the force there, in each direction.
         gain_sigma: Standard deviation of the gain of the light.
         gamma: Exponent of the camera's response.
         roughness: Difference of the traction of neighbouring nodes.
+        deep_roughness: The same of a deep contact, over its mean pressure: one that presses harder
+            has a steeper rim. It grows from 0 as `deep_light_share`; the larger of the two counts.
         normal_stress: Size of the pressure.
         tangential_stress: Size of the tangential traction.
         unseen_force: Normal force of a contact that the light may not show, over Young's modulus,
@@ -44,11 +48,14 @@ class JointSettings:
         most_sigma: Standard deviation of the normal force by the markers alone, over the force,
             beyond which it is unknown.
         least_pressure: Share of the mean pressure below which a node is taken to be free.
+        deep_least_pressure: The same of a deep contact.
         light_reach: Steps along the lattice around the region whose light is used.
         marker_reach: The same for the markers.
         rounds: Linearisations on the region seen, and then each time on the nodes that press.
         following_rounds: The same on the nodes that pressed before and those next to them: after
             `rounds`, or instead of them where the frame before had this contact.
+        deep_rounds: Most further linearisations of a deep contact, until the force changes by less
+            than a hundredth.
 
     Raises:
         ValueError: A value is impossible.
@@ -60,20 +67,24 @@ class JointSettings:
     bending_share: float = 0.8
     light_error: float = 0.02
     light_share: float = 0.05
+    deep_light_share: float = 0.2
     edge_share: float = 0.05
     gain_sigma: float = 0.2
     gamma: float = 1.8
     roughness: float = 0.17
+    deep_roughness: float = 2.0
     normal_stress: float = 1.4
     tangential_stress: float = 0.07
     unseen_force: float = 0.2
     unseen_by_markers: float = 0.5
     most_sigma: float = 0.4
     least_pressure: float = 0.15
+    deep_least_pressure: float = 0.25
     light_reach: int = 4
     marker_reach: int = 8
     rounds: tuple[int, ...] = (2, 1)
     following_rounds: tuple[int, ...] = (1, 1)
+    deep_rounds: int = 3
 
     def with_light(self, light: LightCalibration) -> JointSettings:
         """The settings for a calibrated light.

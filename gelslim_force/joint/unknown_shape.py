@@ -6,6 +6,7 @@ they show height.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import FoundForces, NormalReading
 from gelslim_force.contact.shading_change import LostColourError
-from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm
+from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm, law_of
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator, JointForces
 from gelslim_force.joint.light_calibration import LightCalibration
@@ -25,6 +26,7 @@ from gelslim_force.joint.light_view import LightView
 from gelslim_force.joint.marker_misfit import with_misfit
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
+from gelslim_force.joint.node_relief import NodeRelief
 from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import MARKERS_ALONE, JointSettings
@@ -175,6 +177,7 @@ def unknown_shape(
         ValueError: The reference is dark or of another size.
         MeshError: The pad has too many surface nodes.
     """
+    gel = law_of(bundle, gel)
     chosen = settings or (MARKERS_ALONE if reference is None else JointSettings())
     if light is not None:
         chosen = chosen.with_light(light)
@@ -188,6 +191,8 @@ def unknown_shape(
     seen = None
     if reference is not None:
         seen = _light_view(bundle, calibration, reference, lattice, light)
+    # A linear gel is too soft by more than shadows matter, and they make up for a part of it.
+    bare = seen is None or gel == "linear"
     estimator = JointEstimator(
         points_mm,
         surface_share_mm2(bundle.mesh),
@@ -205,6 +210,8 @@ def unknown_shape(
         chosen,
         strained=None if gel == "linear" else FiniteStrainForce(bundle),
         strained_from_mm=deep_mm(bundle) if gel == "auto" else 0.0,
+        relief=None if bare else NodeRelief.of(_traced(bundle), lattice, deep_mm(bundle)),
+        deep_mm=math.inf if gel == "linear" else deep_mm(bundle),
     )
     if seen is None:
         estimator = replace(

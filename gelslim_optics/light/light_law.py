@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from gelslim_optics.light.light_map import LightMap
 
 Array = NDArray[np.float64]
+SCATTERED = 0.12
+"""Share of the light that the coat scatters back, which no wall of the surface keeps away."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,12 @@ class LightLaw:
         return value, (1 - self.ambient) * by_slope
 
     def change(
-        self, slope: Array, share: Array, level: Array, gain: float | Array
+        self,
+        slope: Array,
+        share: Array,
+        level: Array,
+        gain: float | Array,
+        relief: Array | None = None,
     ) -> tuple[Array, Array, Array]:
         """Logarithmic change of the grey values of c channels.
 
@@ -83,11 +90,16 @@ class LightLaw:
             level: (c, n) grey value of the reference over itself plus the floor that was added
                 before the logarithm.
             gain: Factor on the logarithm of the light, one number or (c, n); 1 for light as traced.
+            relief: (k, n) direct light over that of the slopes alone, as `Relief` gives it; None
+                for surfaces whose heights do not matter.
 
         Returns:
             (c, n) change, (c, n, 2) its derivative by the slopes, (c, n) by the gain.
         """
         value, by_slope = self.irradiance(slope)
+        if relief is not None:
+            value = SCATTERED + (value - SCATTERED) * relief
+            by_slope = by_slope * relief[:, :, None]
         light = np.einsum("kcn,kn->cn", share, value)
         light_slope = np.einsum("kcn,knd->cnd", share, by_slope)
         exponent = gain / self.gamma

@@ -111,7 +111,8 @@ class LightMap:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> LightMap:
         """Light from the arrays that a bundle stores; see `light_arrays`."""
-        return cls(**{name: np.asarray(arrays[name], dtype=float) for name in LIGHT_FIELDS})
+        kept = (*LIGHT_FIELDS, "fans") if "fans" in arrays else LIGHT_FIELDS
+        return cls(**{name: np.asarray(arrays[name], dtype=float) for name in kept})
 
     @property
     def sources(self) -> int:

@@ -75,9 +75,27 @@ def _reached(height_mm: Array, way: Array, steepness: float, cell_mm: float) -> 
 
 
 def guided_bundle(poissons_ratio: float) -> Bundle:
-    """The sensor with this light, as traced, and another Poisson's ratio."""
+    """The sensor with this light, as a tracer tallies it, and another Poisson's ratio."""
     plain = lit_bundle()
     material = replace(plain.material, poissons_ratio=poissons_ratio)
     light = LightMap.from_arrays(plain.light)
     steep = replace(light, elevation_deg=np.full(2, np.degrees(np.arctan(1 / sensitivity()))))
-    return replace(plain.with_gel(material), light=light_arrays(steep))
+    with_fans = replace(steep, fans=tallied())
+    return replace(plain.with_gel(material), light=light_arrays(with_fans))
+
+
+def tallied() -> Array:
+    """(2, 1, 1, b, 3) sums of red and green light as a tracer tallies them, in bins of direction.
+
+    A bin has a twelfth of the sine of the elevation, and a twelfth of the turn.
+    """
+    fans = np.zeros((2, 12, 12, 3))
+    for source, (x, y) in enumerate(TRAVEL[:2]):
+        for elevation, azimuth, share in FANS:
+            turn = np.degrees(np.arctan2(y, x)) + azimuth
+            tangent = 1 / np.tan(np.radians(elevation))
+            way = tangent * np.array([np.cos(np.radians(turn)), np.sin(np.radians(turn))])
+            at = int(12 * np.sin(np.radians(elevation))), int(turn % 360 / 30)
+            fans[source][at] += share * np.array([1.0, *way])
+    flat = fans.reshape(2, 1, 1, -1, 3)
+    return flat[..., flat[..., 0].any(axis=(0, 1, 2)), :]

@@ -1,0 +1,52 @@
+"""How deep a contact is, and what is assumed of deep ones.
+
+The rims of a deep contact are steep. What the mesh does not resolve there is a larger share of the
+light, and pressures differ more from node to node.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.joint.settings import JointSettings
+
+Array = NDArray[np.float64]
+FULLY = 1.4
+"""Depth from which a contact is wholly deep, over that from which it begins to be."""
+
+
+def deepness(displacement_mm: Array, deep_mm: float) -> float:
+    """0 for contacts up to the depth `deep_mm`, growing to 1 at `FULLY` times that.
+
+    `displacement_mm` is the motion (c, 3) of the surface nodes.
+    """
+    depth = -float(displacement_mm[:, 2].min(initial=0.0))
+    return min(max((depth / deep_mm - 1.0) / (FULLY - 1.0), 0.0), 1.0)
+
+
+def settings_at(settings: JointSettings, deep: float) -> JointSettings:
+    """The settings of a contact between shallow, 0, and deep, 1."""
+    if deep == 0.0:
+        return settings
+    light = (1 - deep) * settings.light_share + deep * settings.deep_light_share
+    least = (1 - deep) * settings.least_pressure + deep * settings.deep_least_pressure
+    return replace(settings, light_share=light, least_pressure=least)
+
+
+def roughness_mpa(
+    settings: JointSettings, deep: float, youngs_modulus_mpa: float, pressure_mpa: Array
+) -> float:
+    """Standard deviation of the difference of the traction of neighbouring nodes.
+
+    Args:
+        settings: Has the shares of the modulus and of the mean pressure.
+        deep: As `deepness` gives it.
+        youngs_modulus_mpa: Of the gel.
+        pressure_mpa: (p,) of the nodes; the mean is weighted by the pressure itself.
+    """
+    pressing = np.maximum(pressure_mpa, 0.0)
+    mean = float(pressing @ pressing / max(float(pressing.sum()), 1e-12))
+    return max(settings.roughness * youngs_modulus_mpa, settings.deep_roughness * deep * mean)
