@@ -179,7 +179,9 @@ def test_corrections_err_by_their_tolerance_and_more_where_walls_slide() -> None
     rim = geometry(2 * depth_px, 2 / nodes[-1] * 1.25 * 2.0)
     capped = expected(0.01).plus(rim).at_most(whole[-1])
     assert values(sliding[0.01]) == pytest.approx(values(capped))
-    assert values(sliding[0.005]) == pytest.approx(values(expected(0.005)))
+    # A finer tolerance makes the forces right, but not which node a sliding wall holds.
+    fine = expected(0.005).plus(geometry(2 * depth_px, 0.0)).at_most(whole[-1])
+    assert values(sliding[0.005]) == pytest.approx(values(fine))
     assert sliding[0.002] == sliding[0.005]
 
 
