@@ -74,6 +74,8 @@ SCENE_FAULTS: tuple[tuple[str, Callable[[str], str]], ...] = (
     ),
     ("observe", lambda t: t.replace("[force]", "[force, force]")),
     ("vary", lambda t: t + "vary: {depth_factor: [1, 0.5]}\n"),
+    ("vary", lambda t: t + "vary: {depth_factor: [0.5, 1, gamma]}\n"),
+    ("vary.split", lambda t: t + "vary: {split: {validation_share: 0.6, test_share: 0.4}}\n"),
 )
 
 
