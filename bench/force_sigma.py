@@ -32,7 +32,7 @@ from gelslim_core.jobs import Engine
 
 Array = NDArray[np.float64]
 Record = Mapping[str, Any]
-SLICE, DEEP_SLICE = 10, 7
+SLICE, DEEP_SLICE = 10, 9
 KEPT = Path("out") / "force_sigma"
 COMPONENTS = ("F_x", "F_y", "F_z")
 COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57")
@@ -126,7 +126,7 @@ def _path(some: Slice, mode: str) -> Path:
 def deep_scored(processes: int) -> dict[str, Any]:
     """Scores and relative errors of the deep contacts by law of the gel; nothing is given."""
     _see_tests()
-    from deep_contacts import COUNT
+    from deep_contacts import COUNT, SEEN
     from deep_gate import LAWS, deep_summary
 
     slices = [
@@ -139,8 +139,12 @@ def deep_scored(processes: int) -> dict[str, Any]:
     for law in LAWS:
         own = [scores[k] for k in range(len(slices)) if slices[k].law == law]
         some = [score for part in own for score in part]
-        errors = {name: _short(value) for name, value in deep_summary(some).items()}
-        found[law] = {**_condition(vars(s.score) for s in some), "relative": errors}
+        parts = {"relative": some, "relative_held_out": some[SEEN:]}
+        errors = {
+            name: {key: _short(value) for key, value in deep_summary(part).items()}
+            for name, part in parts.items()
+        }
+        found[law] = {**_condition(vars(s.score) for s in some), **errors}
     return found
 
 

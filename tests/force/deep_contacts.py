@@ -33,7 +33,9 @@ Array = NDArray[np.float64]
 Profile = Callable[[Array, Array], Array]
 STORED = Path(__file__).with_name("deep_contacts.npz")
 KINDS = ("ball", "rod", "ring", "punch", "two balls", "cone", "tilted plane")
-COUNT = 42
+COUNT, SEEN = 63, 42
+"""Contacts that are stored, and those that were looked at when the estimate was made: the others
+are held out."""
 SOFT, NEARLY_INCOMPRESSIBLE = 0.3223, 0.45
 """Poisson's ratios of the two sensors, which take turns after each round of kinds."""
 STEP_MM, QUANTUM_MM = 0.2, 1e-4

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from camera_rig import off_centre_view
-from deep_contacts import COUNT, KINDS, deep_case, deep_contact, finer_pad, solve
+from deep_contacts import COUNT, KINDS, SEEN, deep_case, deep_contact, finer_pad, solve
 from deep_gate import deep_scores, deep_summary
 from numpy.typing import NDArray
 from sigma_gate import summaries
@@ -67,20 +67,21 @@ def test_a_stored_contact_is_solved_again() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "normal", "normal_95", "shear", "field"),
-    [("linear", 0.13, 0.25, 0.03, 0.35), ("auto", 0.05, 0.09, 0.01, 0.22)],
+    [("linear", 0.13, 0.25, 0.03, 0.35), ("auto", 0.06, 0.12, 0.01, 0.22)],
 )
 def test_forces_at_large_strain(
     law: str, normal: float, normal_95: float, shear: float, field: float
 ) -> None:
-    """What is reached; modulus, thickness and Poisson's ratio alone make 3 to 7 % of F_z."""
+    """What is reached, also by contacts that were held out when the estimate was made."""
     some = deep_scores(law, range(COUNT))
     assert all(s.score.error_n for s in some), [s.score.problem for s in some]
-    reached = deep_summary(some)
-    assert reached["normal"] < normal
-    assert reached["normal_95"] < normal_95
-    assert reached["shear"] < shear
-    assert reached["centre_mm"] < 0.1
-    assert reached["field"] < field
+    for part in (some[:SEEN], some[SEEN:]):
+        reached = deep_summary(part)
+        assert reached["normal"] < normal
+        assert reached["normal_95"] < normal_95
+        assert reached["shear"] < shear
+        assert reached["centre_mm"] < 0.1
+        assert reached["field"] < field
     for summary in summaries(s.score for s in some):
         assert 0.5 < summary.rms < 1.3
         assert summary.covered > 0.85
