@@ -201,7 +201,7 @@ def test_planning_with_a_probe_keeps_every_tolerance_and_saves() -> None:
     }
     # The pictures differ by one grey level in 0.04 % of the pixels; a threshold of the detector
     # moves one dot at the wall of the ring. Its markers are held like all others.
-    assert above == {("press_ring tight", "image")}
+    assert not above
     loose = [row for name, row in cases.items() if name.endswith(" loose")]
     ratios = sorted((row["ms"] + row["planning_ms"]) / row["whole_ms"] for row in loose)
     assert ratios[len(ratios) // 2] <= 0.2
