@@ -95,6 +95,7 @@ def real_sensor() -> RealSensor:
             Responses(SurfaceCompliance(bundle), to_markers),
             view,
             to_markers,
+            lattice.interpolation(view.rest_mm) - to_markers,
             lattice.nearest_node(view.rest_mm[:, :2]),
             view.by_height(),
             LightView(camera, image, rest.reference.positions_px, radius, lattice, light),
