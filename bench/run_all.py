@@ -52,6 +52,7 @@ STEPS = (
     Step("twin_fine"),
     Step("learned_forces", quick=None),
     Step("robot_observation", quick=None, writes=False),
+    Step("press_slip", quick=None, writes=False),
     Step("twin_skin"),
     Step("linear_gel"),
     Step("twin_look", quick=None, writes=False),
