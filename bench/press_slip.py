@@ -9,6 +9,7 @@ Simulation and bundle stay in out/press_slip.
 
 from __future__ import annotations
 
+import argparse
 import csv
 import io
 from collections.abc import Sequence
@@ -69,6 +70,9 @@ class Truth:
 
 def main() -> None:
     """Simulate, measure, draw; print how far the measurement is off."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     pictures, truth = simulated()
     sensor = open_sensor(calibrated_bundle(), reference=pictures[0])
     results = [
