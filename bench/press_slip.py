@@ -4,7 +4,7 @@
 
 The twin draws what the camera sees; the force pipeline gets these pictures, a bundle and nothing
 else. The simulated gel is the nominal one, and the bands hold its tolerances after a calibration.
-Simulation and bundle stay in out/press_slip.
+The simulation stays in out/press_slip.
 """
 
 from __future__ import annotations

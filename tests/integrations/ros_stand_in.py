@@ -119,7 +119,11 @@ def install(monkeypatch: pytest.MonkeyPatch, store: Any) -> None:
 
     def messages(package: str, *names: str) -> None:
         def constructor(name: str) -> Any:
-            return lambda: empty(store, f"{package}/msg/{name}")
+            def made() -> Any:
+                return empty(store, f"{package}/msg/{name}")
+
+            made.__name__ = name
+            return made
 
         module(package)
         module(f"{package}.msg", **{name: constructor(name) for name in names})

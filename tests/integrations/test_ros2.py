@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import re
+import runpy
+import subprocess
 import sys
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +15,7 @@ import output_samples as samples
 import pytest
 import ros_stand_in as ros
 from camera_rig import finger_view
+from ruamel.yaml import YAML
 
 from gelslim_force.outputs.mcap_recording import force_field_definition
 from gelslim_ros import messages as msg
@@ -203,3 +207,48 @@ def test_a_pressed_sensor_gives_the_forces_of_its_pipeline() -> None:
     assert server.tare()[0]
     server.take(truth.image)
     assert not server.tare()[0]
+
+
+@pytest.mark.slow
+def test_the_round_trip_of_the_container_compares_every_field(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The script that the job with ROS runs, here with the serialisation of rosbags."""
+    store = ros.type_store()
+    ros.install(monkeypatch, store)
+    spoilt: list[bool] = []
+
+    def serialize(message: Any) -> bytes:
+        return bytes(store.serialize_cdr(ros.with_arrays(store, message), message.__msgtype__))
+
+    def deserialize(sent: bytes, constructor: Any) -> Any:
+        message = store.deserialize_cdr(sent, constructor().__msgtype__)
+        if hasattr(message, "covariance") and spoilt:
+            message.covariance = message.covariance + 1
+        return message
+
+    module = ModuleType("rclpy.serialization")
+    module.serialize_message, module.deserialize_message = serialize, deserialize  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "rclpy.serialization", module)
+    script = runpy.run_path(str(ros.INTEGRATION / "round_trip.py"))
+    script["main"]()
+    assert capsys.readouterr().out.count("come back") == 3
+    spoilt.append(True)
+    with pytest.raises(AssertionError, match="covariance"):
+        script["main"]()
+
+
+def test_the_job_with_ros_is_written_in_shell_and_names_files_that_exist() -> None:
+    """It needs a container, which not every machine has."""
+    root = ros.INTEGRATION.parents[1]
+    text = (root / ".github" / "workflows" / "test.yml").read_text(encoding="utf-8")
+    job = YAML(typ="safe").load(text)["jobs"]["ros2"]
+    assert job["container"].startswith("ros:")
+    steps = [step["run"] for step in job["steps"] if "run" in step]
+    assert len(steps) >= 4
+    for step in steps:
+        checked = subprocess.run(["bash", "-n", "-c", step], capture_output=True, text=True)
+        assert checked.returncode == 0, checked.stderr
+    named = re.findall(r"integrations/[\w/]+\.py", "\n".join(steps))
+    assert named
+    assert all((root / path).is_file() for path in named)
