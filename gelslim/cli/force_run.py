@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -75,7 +76,7 @@ def result_sinks(
     recorder = RunRecorder(outputs.folder, identity, chosen, keep, outputs.overwrite)
     sinks.insert(0, RecorderSink(stack.enter_context(recorder)))
     if outputs.view:
-        sinks.append(_view_sink(stack, overlay, outputs.quiet))
+        sinks += _view_sinks(stack, overlay, pipeline, outputs.quiet)
     if not outputs.pictures:
         return sinks, None
     from gelslim_force.outputs.sinks import PictureSink
@@ -143,15 +144,23 @@ def _video(
     return VideoSink(overlay, made, LiveScale(Extent()))
 
 
-def _view_sink(stack: ExitStack, overlay: Overlay, quiet: bool) -> Any:
+def _view_sinks(
+    stack: ExitStack, overlay: Overlay, pipeline: ForcePipeline, quiet: bool
+) -> list[Any]:
     from gelslim_force.outputs.arrow_scale import Extent, LiveScale
     from gelslim_force.outputs.live_view import LiveView
-    from gelslim_force.outputs.sinks import ViewSink
+    from gelslim_force.outputs.sinks import TareSink, ViewSink
 
     live = stack.enter_context(LiveView())
     if not quiet:
         print(f"Watch at {live.url}", flush=True)
-    return ViewSink(overlay, live.show, LiveScale(Extent()))
+    shown = ViewSink(overlay, live.show, LiveScale(Extent()), note=live.note)
+
+    def tare(image: Any, time_s: float) -> str:
+        shift = hypot(*pipeline.tare(image, time_s=time_s).shift_px)
+        return f"new rest: the picture has moved by {shift:.2f} px since the calibration"
+
+    return [shown, TareSink(tare, live.grant)]
 
 
 def _overlay(pipeline: ForcePipeline) -> Overlay:

@@ -20,6 +20,7 @@ from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.arrow_scale import LiveScale, scale_of_run
 from gelslim_force.outputs.overlay import Overlay, write_overlay
 from gelslim_force.outputs.overlay_video import OverlayVideo
+from gelslim_force.tracking.drift_filter import TareError
 
 _PICTURE = re.compile(r"frame_\d{6,}\.png")
 Show = Callable[[NDArray[np.uint8], FrameResult], None]
@@ -111,16 +112,50 @@ class VideoSink:
 
 @dataclass(eq=False)
 class ViewSink:
-    """Shows every n-th frame, for example in a `LiveView`."""
+    """Shows every n-th frame, for example in a `LiveView`.
+
+    Attributes:
+        overlay: What draws the pictures.
+        show: Shows a picture with its result.
+        scale: Lengths of the arrows.
+        every: n.
+        note: Takes every result, also of frames that are not shown.
+    """
 
     overlay: Overlay
     show: Show
     scale: LiveScale
     every: int = 3
+    note: Callable[[FrameResult], None] | None = None
     _count: int = 0
 
     def take(self, image: NDArray[np.uint8] | None, result: FrameResult) -> None:
         """Draw and show the frame if it is an n-th one."""
+        if self.note is not None:
+            self.note(result)
         if self._count % self.every == 0:
             self.show(self.overlay.draw(image, result, self.scale.scale(result)), result)
         self._count += 1
+
+
+@dataclass(frozen=True, eq=False)
+class TareSink:
+    """Takes a new rest where a viewer has asked for one.
+
+    Attributes:
+        tare: Takes the rest from a picture and its time in s, and returns a sentence about it.
+        grant: Calls what it is given if a rest was asked for, such as `LiveView.grant`.
+    """
+
+    tare: Callable[[NDArray[np.uint8], float], str]
+    grant: Callable[[Callable[[], str]], None]
+
+    def take(self, image: NDArray[np.uint8] | None, result: FrameResult) -> None:
+        """Take the rest from this frame's picture."""
+
+        def taken() -> str:
+            if image is None:
+                raise TareError("this frame could not be read; try again")
+            return self.tare(image, result.time_s)
+
+        self.grant(taken)
