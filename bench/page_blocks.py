@@ -21,6 +21,7 @@ import data_set_cost
 import force_sigma
 import learned_forces
 import linear_gel
+import real_locations
 import twin_batch
 import twin_fine
 import twin_look
@@ -86,7 +87,10 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "drawn-light": _from("drawn_light", drawn_light_table.table),
     },
     "docs/data_sets.md": {"data-set-cost": _from("data_set_cost", data_set_cost.table)},
-    "docs/train.md": {"learned-forces": _from("learned_forces", learned_forces.table)},
+    "docs/train.md": {
+        "learned-forces": _from("learned_forces", learned_forces.table),
+        "real-locations": _from("real_locations", real_locations.table),
+    },
     "docs/twin_steps.md": {
         "steps": _from("twin_steps", twin_steps.table),
         "batch": twin_batch.page_table,
