@@ -7,8 +7,10 @@ import re
 import runpy
 import subprocess
 import sys
+from dataclasses import replace
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import output_samples as samples
@@ -236,6 +238,67 @@ def test_the_round_trip_of_the_container_compares_every_field(
     spoilt.append(True)
     with pytest.raises(AssertionError, match="covariance"):
         script["main"]()
+
+
+class LinkedNode(ros.StandInNode):
+    """A node whose messages reach the other nodes of this process at once, by absolute names."""
+
+    takers: ClassVar[dict[str, list[Any]]] = {}
+
+    def _absolute(self, topic: str) -> str:
+        if topic.startswith("~/"):
+            return f"/gelslim/{self._name}/{topic[2:]}"
+        return topic if topic.startswith("/") else f"/gelslim/{topic}"
+
+    def create_publisher(self, kind: Any, topic: str, depth: Any) -> Any:
+        takers = self.takers.setdefault(self._absolute(topic), [])
+
+        def publish(message: Any) -> None:
+            for take in takers:
+                take(message)
+
+        return SimpleNamespace(publish=publish, get_subscription_count=lambda: len(takers))
+
+    def create_subscription(self, kind: Any, topic: str, call: Any, qos: Any) -> None:
+        self.takers.setdefault(self._absolute(topic), []).append(call)
+
+    def destroy_node(self) -> None:
+        self.takers.clear()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("true_n", "status"), [(None, 0), (-0.001, 1)], ids=["as found", "other"])
+def test_the_drawn_press_of_the_container_judges_the_node(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, true_n: float | None, status: int
+) -> None:
+    """The script that the job with ROS runs, here with linked nodes and known results."""
+    image = pytest.importorskip("PIL.Image")
+    frame = samples.frame(1)
+    assert frame.wrench is not None
+    found = float(frame.wrench.force_n[2])
+    (tmp_path / "frames").mkdir()
+    for k in range(2):
+        image.fromarray(COLOURS).save(tmp_path / "frames" / f"frame_{k:06d}.png")
+    truth = f"frame,fz_n\n0,0.0\n1,{found if true_n is None else true_n}\n"
+    (tmp_path / "truth.csv").write_text(truth, encoding="utf-8")
+
+    class Answers(Pipeline):
+        def process(self, picture: np.ndarray, stamp_s: float | None = None) -> Any:
+            np.testing.assert_array_equal(picture, COLOURS)
+            return replace(frame, stamp_s=stamp_s)
+
+    ros.install(monkeypatch, ros.type_store())
+    monkeypatch.setattr(sys.modules["rclpy.node"], "Node", LinkedNode)
+    for name in ("init", "spin_once", "try_shutdown"):
+        monkeypatch.setattr(sys.modules["rclpy"], name, lambda *_, **__: None, raising=False)
+    monkeypatch.setattr(LinkedNode, "takers", {})
+    monkeypatch.setattr(LinkedNode, "given", {"overlay_every": 0})
+    monkeypatch.delitem(sys.modules, "gelslim_ros.force_node", raising=False)
+    module = importlib.import_module("gelslim_ros.force_node")
+    monkeypatch.setattr(module, "open_sensor", lambda *_, **__: Answers())
+    module.ForceNode()
+    script = runpy.run_path(str(ros.INTEGRATION / "drawn_press.py"))
+    assert script["main"](tmp_path) == status
 
 
 def test_the_job_with_ros_is_written_in_shell_and_names_files_that_exist() -> None:
