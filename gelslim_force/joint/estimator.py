@@ -23,18 +23,18 @@ from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
 from gelslim_force.joint.fit_state import FitState, FrameData
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
-from gelslim_force.joint.marker_rows import MarkerRows, apparent_mm, rms_length
+from gelslim_force.joint.marker_rows import MarkerRows, rms_length
 from gelslim_force.joint.model_errors import at_edge, by_region, edge_nodes
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
-from gelslim_force.joint.normal_equations import NormalEquations, huber
+from gelslim_force.joint.normal_equations import NormalEquations
 from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.variance_components import scaled_covariance
-from gelslim_force.motion.marker_motion import MarkerView
+from gelslim_force.motion.marker_motion import MarkerRays, MarkerView
 from gelslim_optics.light.light_law import LightLaw
 from ifem_export.operators.adjoint_fields import rigid_motions
 
@@ -66,6 +66,7 @@ class JointForces:
         gain: Gain of the light found in this frame.
         unexplained: Share of the change of light in the region that the forces do not explain.
         shown: (c,) nodes whose slope the light shows; none without light.
+        linear_mm: (c, 3) motion of a linear gel under the forces; None where it is not known.
     """
 
     force_n: Array
@@ -78,6 +79,12 @@ class JointForces:
     gain: float
     unexplained: float
     shown: Mask
+    linear_mm: Array | None = None
+
+    @property
+    def state(self) -> FitState:
+        """What the fit of the next frame starts from."""
+        return FitState(self.force_n, self.displacement_mm, self.gain, self.linear_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,15 +158,16 @@ class JointEstimator:
             IfemError: The strained law does not converge.
         """
         seen = None if self.light is None else self.light.look(image, markers_px)
-        frame = FrameData(seen, markers_px, noise_px)
+        frame = FrameData(seen, MarkerRays(self.markers, markers_px), noise_px)
         region = self._region(frame)
         if region.sum() < _LEAST_NODES:
             return None
         if last is None or not (last.region & region).any():
             still = np.zeros_like(self.points_mm)
-            begun = self._rounds(frame, region, FitState(still, still, 1.0), self.settings.rounds)
+            start = FitState(still, still, 1.0, still)
+            begun = self._rounds(frame, region, start, self.settings.rounds)
         else:
-            begun = last.region, FitState(last.force_n, last.displacement_mm, last.gain)
+            begun = last.region, last.state
             if is_new_contact(region, last.seen, self.lattice):
                 begun = self._rounds(frame, region, begun[1], self.settings.rounds)
         nodes = region & self.lattice.widened(begun[0], 1)
@@ -216,7 +224,7 @@ class JointEstimator:
             return contact_nodes(frame.seen.shading, rise, self.light.rest_mm, self.lattice)
         if self.moved is None:
             return np.zeros(len(self.points_mm), dtype=bool)
-        lateral = self.markers.lateral_motion(frame.markers_px)
+        lateral = self.markers.lateral_motion(frame.markers.positions_px)
         return self.moved.nodes(lateral, self._noise_mm(frame), self.settings.marker_mm)
 
     def _rise(self, light: LightView, seen: SeenLight) -> Array | None:
@@ -238,9 +246,9 @@ class JointEstimator:
     def _round(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
         """Linearise at the state, and solve."""
         start, offset = state.force_n[nodes].ravel(), self._offset(state)
-        moved = self.responses.displacement(nodes, state.force_n[nodes]) + offset
         chosen, near = self.settings, np.zeros(len(self.points_mm), dtype=bool)
         near[nodes] = True
+        moved = self._linear(nodes, near, state) + offset
         markers = self._marker_rows(frame, near, moved)
         equations = NormalEquations.of(len(start))
         equations = equations.with_rows(markers.rows, markers.residual, markers.weight)
@@ -261,12 +269,26 @@ class JointEstimator:
         found = equations.solved(start, chosen.friction)
         force = np.zeros_like(state.force_n)
         force[nodes] = found.reshape(-1, 3)
-        motion = self.responses.displacement(nodes, force[nodes]) + offset
+        linear = self.responses.displacement(nodes, force[nodes])
+        motion = linear + offset
         if light is None:
-            return FitState(force, motion, state.gain, equations, markers)
+            return FitState(force, motion, state.gain, linear, equations, markers)
         higher = np.asarray(heights @ (found - start).astype(heights.dtype), dtype=float)
         gain = light.gain_after(higher, chosen.gain_sigma)
-        return FitState(force, motion, gain, equations, markers, light.unexplained(higher))
+        left = light.unexplained(higher)
+        return FitState(force, motion, gain, linear, equations, markers, left)
+
+    def _linear(self, nodes: Nodes, near: Mask, state: FitState) -> Array:
+        """Motion (c, 3) of a linear gel under the forces of the state on the nodes `near` (c,).
+
+        Most forces act there, so that what the others move is taken off.
+        """
+        if state.linear_mm is None:
+            return self.responses.displacement(nodes, state.force_n[nodes])
+        others = np.flatnonzero(state.force_n.any(axis=1) & ~near)
+        if not len(others):
+            return state.linear_mm
+        return state.linear_mm - self.responses.displacement(others, state.force_n[others])
 
     def _offset(self, state: FitState) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
@@ -281,18 +303,27 @@ class JointEstimator:
 
         What is not resolved: a share of the motion of all, and of each marker's `bending`.
         """
-        wide = self.lattice.widened(near, self.settings.marker_reach)[self.marker_node]
-        model = self.nodes_to_markers @ moved_mm
-        positions = np.where(wide[:, None], frame.markers_px, np.nan)
-        lateral = self.markers.lateral_motion(positions, model[:, 2])
-        used = np.flatnonzero(np.isfinite(lateral).all(axis=1))
+        from gelslim_force.joint.marker_kernel import marker_data
+
+        chosen = self.settings
+        wide = self.lattice.widened(near, chosen.marker_reach)[self.marker_node]
+        used = np.flatnonzero(wide & frame.markers.known)
+        model, bent = np.vsplit(self._to_markers @ moved_mm, 2)
+        lateral = frame.markers.lateral(used, model[used, 2])
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
-        residual = (lateral[used] - model[used, :2]).ravel()
-        share = self.settings.marker_share * rms_length(model[used])
-        bent = apparent_mm((self.bending @ moved_mm)[used], self.by_height[used])
-        noise = np.hypot(self._noise_mm(frame)[used], self.settings.bending_share * bent)
-        sigma = np.repeat(np.sqrt(self.settings.marker_mm**2 + share**2 + noise**2), 2)
-        return MarkerRows(used, rows, residual, huber(residual, sigma, _MARKER_LIMIT))
+        share = chosen.marker_share * rms_length(model[used])
+        residual, weight = np.empty((2, 2 * len(used)))
+        marker_data(
+            used, lateral, model, bent, self.by_height, self._noise_mm(frame),
+            (math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT),
+            residual, weight,
+        )  # fmt: skip
+        return MarkerRows(used, rows, residual, weight)
+
+    @cached_property
+    def _to_markers(self) -> sparse.csr_array:
+        """(2n, c) `nodes_to_markers` over `bending`."""
+        return sparse.csr_array(sparse.vstack([self.nodes_to_markers, self.bending]))
 
     def _light(
         self, frame: FrameData, near: Mask, moved_mm: Array, state: FitState
@@ -341,6 +372,7 @@ class JointEstimator:
             state.gain,
             state.unexplained,
             self._shown(frame.seen),
+            state.linear_mm,
         )
 
     def _shown(self, seen: SeenLight | None) -> Mask:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gelslim_force.joint.light_view import SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows
 from gelslim_force.joint.normal_equations import NormalEquations
+from gelslim_force.motion.marker_motion import MarkerRays
 
 Array = NDArray[np.float64]
 
@@ -20,12 +21,12 @@ class FrameData:
 
     Attributes:
         seen: Its light; None where the markers alone are used.
-        markers_px: (n, 2) followed markers; NaN for lost ones.
+        markers: Rays of the followed markers.
         noise_px: Standard deviation of their positions.
     """
 
     seen: SeenLight | None
-    markers_px: Array
+    markers: MarkerRays
     noise_px: float
 
 
@@ -37,6 +38,7 @@ class FitState:
         force_n: (c, 3) on the surface nodes.
         displacement_mm: (c, 3) of the surface nodes.
         gain: Of the light.
+        linear_mm: (c, 3) motion of a linear gel under the forces; None where it is not known.
         equations: That it solves; None for a start.
         markers: Data of the markers that it explains; None for a start.
         unexplained: Share of the change of light that is left.
@@ -46,6 +48,7 @@ class FitState:
     force_n: Array
     displacement_mm: Array
     gain: float
+    linear_mm: Array | None = None
     equations: NormalEquations | None = None
     markers: MarkerRows | None = None
     unexplained: float = 0.0

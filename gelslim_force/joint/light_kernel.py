@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,92 @@ def bilinear(at: Any, number: Any, values: Any, found: Any) -> None:
 
 
 @njit(**COMPILED)
+def light_data(
+    value: Any,
+    steep: Any,
+    change: Any,
+    noise: Any,
+    saturated: Any,
+    share: Any,
+    level: Any,
+    gains: Any,
+    gain: Any,
+    relief: Any,
+    area: Any,
+    camera: Any,
+    errors: Any,
+    by_slope: Any,
+    by_gain: Any,
+    residual: Any,
+    weight: Any,
+    sums: Any,
+) -> None:
+    """What c channels in n bins see less what the law of the light says, linear about the slopes.
+
+    It is `LightLaw.change` with the weights of the residuals, which grow linearly beyond a number
+    of standard deviations. What a model that is brighter sees saturated counts nothing.
+
+    Args:
+        value: (k, n) irradiance, as `LightLaw.irradiance` gives it.
+        steep: (k, n, 2) its derivatives by the slopes.
+        change: (c, n) seen.
+        noise: (c, n) its standard deviation.
+        saturated: (c, n).
+        share: (k, c, n), as `LightLaw.change` takes it.
+        level: (c, n), likewise.
+        gains: (c, n), likewise.
+        gain: What the gains are a multiple of.
+        relief: (k, n) direct light over that of the slopes alone; (0, 0) where it is 1.
+        area: (n,) of the bins in mm².
+        camera: Exponent of the camera, and share of the light that the coat scatters back.
+        errors: Standard deviation of the mean over 1 mm² by the law of the light, the same over
+            what a shadow takes, and deviations beyond which a residual counts linearly.
+        by_slope: Receives (c, n, 2) derivatives by the slopes.
+        by_gain: Receives (c, n) derivatives by `gain`.
+        residual: Receives (c, n).
+        weight: Receives (c, n).
+        sums: Receives weighted sums: derivative by the gain squared, derivative times residual,
+            and squares of residual, change and noise.
+    """
+    gamma, scattered = camera
+    light_error, shaded_error, limit = errors
+    sources, shaded = len(value), len(relief) > 0
+    for k in range(len(area)):
+        for c in range(len(change)):
+            light = by_x = by_y = lost = 0.0
+            for source in range(sources):
+                part, lit = share[source, c, k], value[source, k]
+                if shaded:
+                    factor = relief[source, k]
+                    lost += part * abs(1 - factor)
+                    lit = scattered + (lit - scattered) * factor
+                    by_x += part * factor * steep[source, k, 0]
+                    by_y += part * factor * steep[source, k, 1]
+                else:
+                    by_x += part * steep[source, k, 0]
+                    by_y += part * steep[source, k, 1]
+                light += part * lit
+            log_light, exponent = math.log(light), gains[c, k] / gamma
+            grey = math.exp(exponent * log_light)
+            seen = 1 + level[c, k] * (grey - 1)
+            outer = level[c, k] * exponent * grey / (seen * light)
+            by_slope[c, k, 0], by_slope[c, k, 1] = outer * by_x, outer * by_y
+            grown = level[c, k] * grey * log_light / (seen * gamma) * (gains[c, k] / gain)
+            apart = change[c, k] - math.log(seen)
+            model_error = light_error * light_error + (shaded_error * lost) ** 2
+            sigma = math.sqrt(model_error / area[k] + noise[c, k] ** 2)
+            w = min(1.0, limit / max(abs(apart) / sigma, 1e-12)) / (sigma * sigma)
+            if saturated[c, k] and apart < 0:
+                w = 0.0
+            by_gain[c, k], residual[c, k], weight[c, k] = grown, apart, w
+            sums[0] += w * grown * grown
+            sums[1] += w * grown * apart
+            sums[2] += w * apart * apart
+            sums[3] += w * change[c, k] ** 2
+            sums[4] += w * noise[c, k] ** 2
+
+
+@njit(**COMPILED)
 def slope_sums(
     nodes: Any,
     along: Any,
@@ -108,7 +195,7 @@ def slope_sums(
         by_gain: (c, n) derivatives d by the gain.
         residual: (c, n) values r.
         weight: (c, n) weights w.
-        matrix: (m, m), to which the sum of w a aᵀ is added.
+        matrix: (m, m) zeros; receives the sum of w a aᵀ.
         pull: (m,), to which that of w a r is added.
         mixed: (m,), to which that of w a d is added.
     """
@@ -130,8 +217,13 @@ def slope_sums(
             node = nodes[k, a]
             pull[node] += rx * along[k, a] + ry * across[k, a]
             mixed[node] += gx * along[k, a] + gy * across[k, a]
-            for b in range(_TAPS * _TAPS):
+            matrix[node, node] += (left_x * along[k, a] + left_y * across[k, a]) / 2
+            for b in range(a + 1, _TAPS * _TAPS):
                 matrix[node, nodes[k, b]] += left_x * along[k, b] + left_y * across[k, b]
+    # Each pair of taps was met once.
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            matrix[i, j] = matrix[j, i] = matrix[i, j] + matrix[j, i]
 
 
 @njit(**COMPILED)
@@ -156,9 +248,10 @@ def saturated_bins(image: Any, channels: Any, size: Any, limit: Any, found: Any)
 def gather_heights(values: Any, near: Any, nodes: Any, found: Any) -> None:
     """Entries (m, 3p) of `values` (c, c, 3) for heights of nodes (m,) under forces on (p,)."""
     for k in range(len(near)):
+        row = values[near[k]]
         for n in range(len(nodes)):
-            for axis in range(3):
-                found[k, 3 * n + axis] = values[near[k], nodes[n], axis]
+            one = row[nodes[n]]
+            found[k, 3 * n], found[k, 3 * n + 1], found[k, 3 * n + 2] = one[0], one[1], one[2]
 
 
 @njit(**COMPILED)
@@ -174,10 +267,9 @@ def gather_markers(values: Any, markers: Any, nodes: Any, by_height: Any, found:
     """
     for k in range(len(markers)):
         block = values[markers[k]]
-        for lateral in range(2):
-            lean = by_height[k, lateral]
-            for n in range(len(nodes)):
-                for axis in range(3):
-                    found[2 * k + lateral, 3 * n + axis] = (
-                        block[lateral, nodes[n], axis] - lean * block[2, nodes[n], axis]
-                    )
+        lean_x, lean_y = by_height[k, 0], by_height[k, 1]
+        for n in range(len(nodes)):
+            along, across, height = block[0, nodes[n]], block[1, nodes[n]], block[2, nodes[n]]
+            for axis in range(3):
+                found[2 * k, 3 * n + axis] = along[axis] - lean_x * height[axis]
+                found[2 * k + 1, 3 * n + axis] = across[axis] - lean_y * height[axis]

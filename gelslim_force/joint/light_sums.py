@@ -10,17 +10,13 @@ from numpy.typing import NDArray
 
 from gelslim_force.joint.light_view import LightView, SeenLight
 from gelslim_force.joint.node_lattice import NodeLattice, SlopeTaps
-from gelslim_force.joint.normal_equations import huber
-from gelslim_optics.light.light_law import LightLaw
+from gelslim_optics.light.light_law import SCATTERED, LightLaw
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
 _LIMIT = 10.0
 """Standard deviations beyond which light counts linearly."""
-_WHOLLY = 0.999
-_PLACED = 3
-"""Steps of the iteration for the place at rest."""
 _GAINS = 0.3, 3.0
 _SHADED = 0.2
 """Standard deviation of the mean over 1 mm² of what a shadow takes, over it: its edge moves."""
@@ -111,20 +107,19 @@ class PlacedBins:
             gain: Present gain of the light.
             light_error: Standard deviation of the mean change over 1 mm².
         """
-        from gelslim_force.joint.light_kernel import slope_sums
+        from gelslim_force.joint.light_kernel import light_data, slope_sums
 
         slope = self.taps.slopes(height_mm)
-        gains = gain * self.built
-        model, by_slope, by_gain = law.change(slope, self.share, self.level, gains, self.relief)
-        by_gain = by_gain * self.built
-        residual = self.change - model
-        sigma = np.hypot(light_error / np.sqrt(self.area_mm2), self.noise)
-        if self.relief is not None:
-            shaded = np.einsum("kcn,kn->cn", self.share, np.abs(1 - self.relief))
-            sigma = np.hypot(sigma, _SHADED * shaded / np.sqrt(self.area_mm2))
-        weight = huber(residual, sigma, _LIMIT)
-        # A model that is brighter than what saturates agrees with it.
-        weight[self.saturated & (residual < 0)] = 0.0
+        shape = self.change.shape
+        by_slope, scalars = np.empty((*shape, 2)), np.zeros(5)
+        by_gain, residual, weight = np.empty((3, *shape))
+        relief = np.empty((0, 0)) if self.relief is None else self.relief
+        light_data(
+            *law.irradiance(slope), self.change, self.noise, self.saturated, self.share, self.level,
+            gain * np.broadcast_to(self.built, shape), gain, relief, self.area_mm2,
+            (law.gamma, SCATTERED), (light_error, _SHADED, _LIMIT),
+            by_slope, by_gain, residual, weight, scalars,
+        )  # fmt: skip
         used = np.zeros(len(height_mm), dtype=bool)
         used[self.taps.nodes] = True
         nodes, number = np.flatnonzero(used), np.cumsum(used) - 1
@@ -133,16 +128,17 @@ class PlacedBins:
             number[self.taps.nodes], self.taps.along, self.taps.across,
             by_slope, by_gain, residual, weight, matrix, pull, mixed,
         )  # fmt: skip
+        gain_square, gain_pull, left, seen, by_noise = map(float, scalars)
         return LightSums(
             nodes,
             matrix,
             pull,
             mixed,
-            _sum(weight, by_gain, by_gain),
-            _sum(weight, by_gain, residual),
-            _sum(weight, residual, residual),
-            _sum(weight, self.change, self.change),
-            self.independent * _sum(weight, self.noise, self.noise),
+            gain_square,
+            gain_pull,
+            left,
+            seen,
+            self.independent * by_noise,
             gain,
         )
 
@@ -160,18 +156,10 @@ def placed_bins(
     The line of sight of a bin meets the surface where it is now; the motion (c, 3) of the nodes
     leads from there to the place at rest. Slopes are those of the deformed surface.
     """
-    about = lattice.widened(near, 1)[view.nearest]
-    bins = np.flatnonzero(seen.shading.valid.ravel() & about)
-    rest, lean = view.rest_mm.reshape(-1, 2)[bins], view.lean.reshape(-1, 2)[bins]
-    places = rest
-    for _ in range(_PLACED):
-        moved = lattice.values_at(displacement_mm, places)
-        places = rest + lean * moved[:, 2:] - moved[:, :2]
-    kept = lattice.on(places) & (lattice.values_at(near.astype(float), places) > _WHOLLY)
-    bins, places = bins[kept], places[kept]
+    bins, places = _at_rest(view, seen, lattice, displacement_mm, near)
 
     def of(layers: Any) -> Any:
-        return np.ascontiguousarray(layers.reshape(*layers.shape[:-2], -1)[..., bins])
+        return np.take(layers.reshape(*layers.shape[:-2], -1), bins, axis=-1)
 
     return PlacedBins(
         lattice.slopes_at(places).on_deformed(displacement_mm[:, :2]),
@@ -187,5 +175,16 @@ def placed_bins(
     )
 
 
-def _sum(weight: Array, one: Array, other: Array) -> float:
-    return float(np.einsum("cn,cn,cn->", weight, one, other))
+def _at_rest(
+    view: LightView, seen: SeenLight, lattice: NodeLattice, displacement_mm: Array, near: Mask
+) -> tuple[Nodes, Array]:
+    """The valid bins among the nodes `near` (c,), and their places (n, 2) on the gel at rest."""
+    from gelslim_force.joint.place_kernel import bins_at_rest
+
+    valid, rest = seen.shading.valid.ravel(), view.rest_mm.reshape(-1, 2)
+    bins, places = np.empty(len(valid), dtype=np.intp), np.empty((len(valid), 2))
+    count = bins_at_rest(
+        valid, lattice.widened(near, 1), view.nearest, rest, view.lean.reshape(-1, 2),
+        displacement_mm, near, (lattice.origin_mm, lattice.step_mm, lattice.number), bins, places,
+    )  # fmt: skip
+    return bins[:count], places[:count]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.joint.estimator import JointEstimator, JointForces
+from gelslim_force.motion.marker_motion import MarkerRays
 
 Array = NDArray[np.float64]
 _INSIDE = 0.3
@@ -55,13 +56,13 @@ def marker_misfit(
 
     0 where fewer than four are seen. Arguments as in `with_misfit`.
     """
-    model = estimator.nodes_to_markers @ found.displacement_mm
-    seen = estimator.markers.lateral_motion(markers_px, model[:, 2])
-    inside = estimator.nodes_to_markers @ found.region.astype(float) > _INSIDE
-    inside &= np.isfinite(seen).all(axis=1)
-    if inside.sum() < _LEAST:
+    # The region is a column beside the motion, so that one product serves both.
+    model = estimator.nodes_to_markers @ np.column_stack([found.displacement_mm, found.region])
+    rays = MarkerRays(estimator.markers, markers_px)
+    inside = np.flatnonzero((model[:, 3] > _INSIDE) & rays.known)
+    if len(inside) < _LEAST:
         return 0.0
-    seen = seen[inside]
+    seen = rays.lateral(inside, model[inside, 2])
     noise_mm = noise_px * estimator.markers.usual_mm_per_px
     by_chance = noise_mm**2 * (1 + _MOST_SIGMAS / np.sqrt(len(seen)))
     beyond = float(np.mean(np.square(seen - model[inside, :2]))) - by_chance

@@ -62,17 +62,6 @@ class MarkerRows:
         return np.asarray(max(0.0, 1.0 - seen) * gain @ gain.T)
 
 
-def apparent_mm(moved_mm: Array, by_height: Array) -> Array:
-    """(n,) root mean square, over both axes, of the lateral motion that a picture shows.
-
-    Args:
-        moved_mm: (n, 3) motion of markers.
-        by_height: (n, 2) lateral motion that the picture shows per mm less of height.
-    """
-    seen = moved_mm[:, :2] - by_height * moved_mm[:, 2:]
-    return np.asarray(np.sqrt((seen**2).mean(axis=1)))
-
-
 def rms_length(rows: Array) -> float:
     """Root mean square of the lengths of vectors (n, k); 0 without any."""
     return float(np.sqrt((rows**2).sum(axis=1).mean())) if len(rows) else 0.0

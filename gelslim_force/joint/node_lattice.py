@@ -40,9 +40,11 @@ class SlopeTaps:
 
     def slopes(self, height_mm: Array) -> Array:
         """(n, 2) slopes of a surface with nodes of the given heights (c,)."""
-        height = height_mm[self.nodes]
-        by_x, by_y = (np.einsum("nt,nt->n", w, height) for w in (self.along, self.across))
-        return np.column_stack([by_x, by_y])
+        from gelslim_force.joint.place_kernel import sums_of_taps
+
+        found = np.empty((len(self.nodes), 2))
+        sums_of_taps(self.nodes, self.along, self.across, height_mm, found)
+        return found
 
     def on_deformed(self, lateral_mm: Array) -> SlopeTaps:
         """The slopes of the deformed surface, whose nodes have moved by (c, 2) in its plane.
@@ -50,14 +52,11 @@ class SlopeTaps:
         With the deformation gradient F = I + ∂u/∂x of the plane, they are F⁻ᵀ times the slopes by
         the places at rest. F is taken with a determinant of at least 0.3.
         """
-        along, across = (self.slopes(lateral_mm[:, axis]) for axis in (0, 1))
-        xx, xy, yx, yy = 1 + along[:, :1], along[:, 1:], across[:, :1], 1 + across[:, 1:]
-        size = np.maximum(xx * yy - xy * yx, _LEAST_AREA)
-        return SlopeTaps(
-            self.nodes,
-            (yy * self.along - yx * self.across) / size,
-            (xx * self.across - xy * self.along) / size,
-        )
+        from gelslim_force.joint.place_kernel import turn_taps
+
+        along, across = np.empty_like(self.along), np.empty_like(self.across)
+        turn_taps(self.nodes, self.along, self.across, lateral_mm, _LEAST_AREA, along, across)
+        return SlopeTaps(self.nodes, along, across)
 
 
 def _cubic_weights(part: Array) -> Array:

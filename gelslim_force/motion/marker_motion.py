@@ -15,7 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_optics.camera.height_points import points_at_heights
+from gelslim_optics.camera.height_points import image_points, points_at_heights, points_on_rays
 from gelslim_optics.camera.projection_error import projection_error_mm
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
@@ -113,3 +113,44 @@ class MarkerView:
 
     def _at(self, positions_px: Array, height_mm: Array) -> Array:
         return points_at_heights(self.camera, positions_px, height_mm)
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerRays:
+    """Rays of the n markers of one frame, whose motion is asked for at several heights.
+
+    Attributes:
+        view: The markers.
+        positions_px: (n, 2) where they are seen; NaN for lost ones.
+    """
+
+    view: MarkerView
+    positions_px: Array
+
+    @cached_property
+    def known(self) -> NDArray[np.bool_]:
+        """(n,) markers that are seen."""
+        return np.asarray(np.isfinite(self.positions_px[:, 0] + self.positions_px[:, 1]))
+
+    def lateral(self, chosen: NDArray[np.intp], normal_mm: Array) -> Array:
+        """Displacements (m, 2) of m known markers, by number, as `MarkerView.lateral_motion` gives.
+
+        Args:
+            chosen: (m,) markers.
+            normal_mm: (m,) motion along z.
+        """
+        rest = self.view.rest_mm[chosen]
+        now = points_on_rays(
+            self.view.camera,
+            self.positions_px[chosen],
+            self._image[chosen],
+            rest[:, 2] + normal_mm,
+        )
+        return now[:, :2] - rest[:, :2]
+
+    @cached_property
+    def _image(self) -> Array:
+        """(n, 2) undistorted image points; NaN for lost ones."""
+        image = np.full(self.positions_px.shape, np.nan)
+        image[self.known] = image_points(self.view.camera, self.positions_px[self.known])
+        return image

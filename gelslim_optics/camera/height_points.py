@@ -19,11 +19,19 @@ def points_at_heights(camera: VirtualCamera, pixels: Array, z_mm: Array) -> Arra
     Raises:
         ValueError: The ray of a pixel does not rise to the window.
     """
+    return points_on_rays(camera, pixels, image_points(camera, pixels), z_mm)
+
+
+def image_points(camera: VirtualCamera, pixels: Array) -> Array:
+    """Undistorted image points (n, 2), in focal lengths, of pixels (n, 2)."""
+    image = (pixels - camera.principal_px) / camera.focal_px
+    return image if camera.lens is None else camera.lens.undistort(image)
+
+
+def points_on_rays(camera: VirtualCamera, pixels: Array, image: Array, z_mm: Array) -> Array:
+    """`points_at_heights` of pixels (n, 2) whose `image_points` (n, 2) are known."""
     from gelslim_optics.camera.height_kernel import points_at
 
-    image = (pixels - camera.principal_px) / camera.focal_px
-    if camera.lens is not None:
-        image = camera.lens.undistort(image)
     stack, found = camera.stack, np.empty((len(pixels), 3))
     tops, indices = np.array(stack.tops_mm), np.array(stack.indices)
     if points_at(image, camera.axes, camera.position_mm, tops, indices, z_mm, found):

@@ -15,6 +15,7 @@ side, and by 0.04 in the attached shadow.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,13 @@ class LightLaw:
         directions = light.directions
         return cls(directions[:, :2] / directions[:, 2:], gamma=gamma)
 
+    @cached_property
+    def towards(self) -> Array:
+        """(k, 2) h of each source."""
+        root = np.sqrt(1 + self.penumbra * self.penumbra)
+        steepness = (1 + 1 / root) / (1 + root)
+        return np.asarray(self.sensitivity / ((1 - self.ambient) * steepness))
+
     def irradiance(self, slope: Array) -> tuple[Array, Array]:
         """Irradiance relative to the level surface, and its derivative.
 
@@ -59,19 +67,12 @@ class LightLaw:
         Returns:
             (k, n) and (k, n, 2).
         """
-        width = self.penumbra
-        root = np.sqrt(1 + width * width)
-        unit = (1 + root) / 2
-        steepness = (1 + 1 / root) / 2 / unit
-        towards = self.sensitivity / ((1 - self.ambient) * steepness)
-        lit = 1 - towards @ slope.T
-        smooth = np.sqrt(lit * lit + width * width)
-        part, part_slope = (lit + smooth) / 2 / unit, (1 + lit / smooth) / 2 / unit
-        length = np.sqrt(1 + (slope * slope).sum(axis=1))
-        value = self.ambient + (1 - self.ambient) * part / length
-        by_slope = -(part_slope / length)[:, :, None] * towards[:, None, :]
-        by_slope -= (part / length**3)[:, :, None] * slope
-        return value, (1 - self.ambient) * by_slope
+        from gelslim_optics.light.light_law_kernel import irradiance
+
+        count = len(self.towards), len(slope)
+        value, by_slope = np.empty(count), np.empty((*count, 2))
+        irradiance(slope, self.towards, self.ambient, self.penumbra, value, by_slope)
+        return value, by_slope
 
     def change(
         self,
