@@ -221,7 +221,7 @@ class JointEstimator:
         """(c,) nodes that the frame shows as possibly in contact."""
         if self.light is not None and frame.seen is not None:
             rise = self._rise(self.light, frame.seen)
-            return contact_nodes(frame.seen.shading, rise, self.light.rest_mm, self.lattice)
+            return contact_nodes(frame.seen.shading, rise, self.light.place, self.lattice)
         if self.moved is None:
             return np.zeros(len(self.points_mm), dtype=bool)
         lateral = self.markers.lateral_motion(frame.markers.positions_px)

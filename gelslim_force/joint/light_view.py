@@ -67,6 +67,8 @@ class LightView:
     Attributes:
         rest_mm: (rows, columns, 2) where the bins meet the gel at rest.
         nearest: (rows * columns,) the node nearest to each bin.
+        place: (rows, columns) number of the lattice's place nearest to each bin; see
+            `NodeLattice.place_number`.
         lean: (rows, columns, 2) motion of that place along the line of sight per mm of height.
         area_mm2: (rows, columns) of a bin on the gel.
         level: (c, rows, columns) grey value of the reference over itself plus the floor.
@@ -100,6 +102,7 @@ class LightView:
         places = self.rest_mm.reshape(-1, 2)
         self._light.on_pad &= lattice.on(places).reshape(x.shape)
         self.nearest = lattice.nearest_node(places)
+        self.place = lattice.place_number(places).reshape(x.shape)
         self.channels = source_channels(light)
         dark = [c for c in self.channels if c not in self._light.used]
         if dark:
@@ -198,5 +201,5 @@ def _by_channel(
         part = (0.5, -0.5)[number] * change[0] if number < 2 else change[number]
         own = noise[0] / 2 if number < 2 else noise[number]
         logs.append(change[1] + part)
-        sigma.append(np.hypot(noise[1], own))
+        sigma.append(np.sqrt(noise[1] * noise[1] + own * own))
     return np.asarray(logs, dtype=float), np.asarray(sigma, dtype=float)

@@ -181,10 +181,17 @@ class NodeLattice:
         wide = widened(self.picture(nodes), rings)
         return np.asarray(wide[self.place[:, 0], self.place[:, 1]])
 
-    def nearest(self, points_mm: Array) -> Mask:
-        """(c,) nodes that are nearest to one of the points (n, 2), and those they enclose."""
-        at = np.rint((points_mm - self.origin_mm) / self.step_mm).astype(np.intp)
-        kept = at[((at >= 0) & (at < self.number.shape)).all(axis=1)]
-        places = np.zeros(self.number.shape, dtype=bool)
-        places[kept[:, 0], kept[:, 1]] = True
-        return np.asarray(filled(places)[self.place[:, 0], self.place[:, 1]])
+    def place_number(self, points_mm: Array) -> Nodes:
+        """(n,) number, row by row, of the place nearest to each point (n, 2); -1 beyond them."""
+        at = np.nan_to_num((points_mm - self.origin_mm) / self.step_mm, nan=-1.0)
+        at = np.clip(np.rint(at), -1, self.number.shape).astype(np.intp)
+        inside = ((at >= 0) & (at < self.number.shape)).all(axis=1)
+        return np.where(inside, at[:, 0] * self.number.shape[1] + at[:, 1], -1)
+
+    def nearest(self, places: Nodes) -> Mask:
+        """(c,) nodes at places by number (n,), see `place_number`, and those they enclose."""
+        # The last one is for what lies beyond.
+        marked = np.zeros(self.number.size + 1, dtype=bool)
+        marked[places] = True
+        whole = filled(marked[:-1].reshape(self.number.shape))
+        return np.asarray(whole[self.place[:, 0], self.place[:, 1]])

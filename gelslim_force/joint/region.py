@@ -19,9 +19,11 @@ from gelslim_force.joint.node_lattice import NodeLattice
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Nodes = NDArray[np.intp]
 LEAST_POWER = 6.0
 """Smallest squared change over the noise, averaged over 3 x 3 bins."""
-_LEAST_VALID = 0.2
+LEAST_VALID = 0.2
+"""Share of the 3 x 3 bins that must be valid."""
 _CLOSED, _OPENED = 4, 1
 """Steps by which gaps, such as dots, are closed, and by which specks are removed."""
 _GROWS_FAST = 0.1
@@ -32,7 +34,7 @@ line counts."""
 
 
 def contact_nodes(
-    shading: ShadingChange, rise: Array | None, places_mm: Array, lattice: NodeLattice
+    shading: ShadingChange, rise: Array | None, places: Nodes, lattice: NodeLattice
 ) -> Mask:
     """(c,) nodes that may be in contact.
 
@@ -40,19 +42,19 @@ def contact_nodes(
         shading: Change of the light.
         rise: (rows, columns) change that grows with a rise of the surface along y; None where no
             light tells it.
-        places_mm: (rows, columns, 2) of the bins on the gel.
+        places: (rows, columns) of the bins, as `NodeLattice.place_number` gives them.
         lattice: The surface nodes.
     """
     changed = changed_bins(shading)
-    region = lattice.nearest(places_mm[changed])
+    region = lattice.nearest(places[changed])
     if not region.any():
         return region
     if shading.hidden is not None:
-        region = _continued(region, lattice.nearest(places_mm[shading.hidden]), lattice)
+        region = _continued(region, lattice.nearest(places[shading.hidden]), lattice)
     if rise is None:
         return region
     seen = changed & shading.valid
-    dent = _dent(lattice, places_mm[seen], rise[seen])
+    dent = _dent(lattice, places[seen], rise[seen])
     whole = filled(closed(lattice.picture(region) | dent, 1))
     return np.asarray(whole[lattice.place[:, 0], lattice.place[:, 1]])
 
@@ -120,16 +122,15 @@ def changed_bins(shading: ShadingChange) -> Mask:
     Returns:
         The bins; none where nothing exceeds the noise.
     """
-    layers = slice(0, 2)
-    power = np.square(shading.change[layers] / shading.noise[layers]).sum(axis=0)
-    valid = shading.valid.astype(float)
-    seen = ndimage.uniform_filter(valid, 3)
-    mean = ndimage.uniform_filter(power * valid, 3) / np.maximum(seen, _LEAST_VALID / 2)
-    changed = (mean > LEAST_POWER) & (seen > _LEAST_VALID)
-    box = ndimage.find_objects(changed.astype(np.uint8))
+    from gelslim_force.joint.region_kernel import bins_above_noise
+
+    changed, box = np.empty(shading.valid.shape, dtype=bool), np.empty(4, dtype=np.intp)
+    noise, valid = shading.noise[:2], shading.valid
+    bins_above_noise(shading.change[:2], noise, valid, LEAST_POWER, LEAST_VALID, changed, box)
     found = np.zeros_like(changed)
-    if box:
-        found[box[0]] = _whole(changed[box[0]])
+    top, bottom, left, right = box
+    if top < bottom:
+        found[top:bottom, left:right] = _whole(changed[top:bottom, left:right])
     return found
 
 
@@ -138,15 +139,12 @@ def _whole(changed: Mask) -> Mask:
     return opened(filled(closed(changed, _CLOSED)), _OPENED)
 
 
-def _dent(lattice: NodeLattice, places_mm: Array, rise: Array) -> Mask:
-    """(nx, ny) places below the surface by the rise (n,) along y, to a scale, at places (n, 2)."""
-    shape = lattice.number.shape
-    at = np.rint((places_mm - lattice.origin_mm) / lattice.step_mm).astype(np.intp)
-    kept = ((at >= 0) & (at < shape)).all(axis=1)
-    flat = np.ravel_multi_index(tuple(at[kept].T), shape)
-    size = shape[0] * shape[1]
-    count = np.bincount(flat, minlength=size)
-    slope = (np.bincount(flat, rise[kept], size) / np.maximum(count, 1)).reshape(shape)
+def _dent(lattice: NodeLattice, places: Nodes, rise: Array) -> Mask:
+    """(nx, ny) places below the surface by the rise (n,) along y, to a scale, at places (n,)."""
+    size = lattice.number.size
+    # What lies beyond the lattice has the number -1, and comes first.
+    count, total = (np.bincount(places + 1, w, size + 1)[1:] for w in (None, rise))
+    slope = (total / np.maximum(count, 1)).reshape(lattice.number.shape)
     from_first = np.cumsum(slope, axis=1)
     from_last = from_first - from_first[:, -1:]
     depth = np.minimum(-from_first, -from_last)

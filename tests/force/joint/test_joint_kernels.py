@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from gelslim_force.joint.light_kernel import gather_heights, gather_markers, light_data
 from gelslim_force.joint.light_sums import placed_bins
 from gelslim_force.joint.marker_kernel import marker_data
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.normal_equations import huber
+from gelslim_force.joint.region_kernel import bins_above_noise
 from gelslim_optics.light.light_law import SCATTERED, LightLaw
 
 Array = NDArray[np.float64]
@@ -167,3 +169,27 @@ def test_gathered_rows_are_those_of_fancy_indexing() -> None:
     chosen = motion[markers][:, :, nodes]
     expected = chosen[:, :2] - lean[:, :, None, None] * chosen[:, 2:]
     np.testing.assert_allclose(rows, expected.reshape(18, 18), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.4])
+def test_bins_that_changed_are_those_of_filters_of_the_picture(share: float) -> None:
+    rng = np.random.default_rng(9)
+    change = rng.normal(0, 0.004, (2, 37, 52)).astype(np.float32)
+    change[:, rng.random((37, 52)) < share] *= 20
+    noise = rng.uniform(0.005, 0.02, change.shape).astype(np.float32)
+    valid = rng.random((37, 52)) < 0.6
+    valid[:9, :20] = False
+    found, box = np.empty((37, 52), dtype=bool), np.empty(4, dtype=np.intp)
+    bins_above_noise(change, noise, valid, 6.0, 0.2, found, box)
+    power = np.square(change / noise).sum(axis=0) * valid
+    seen = ndimage.uniform_filter(valid.astype(float), 3)
+    mean = ndimage.uniform_filter(power.astype(float), 3) / np.maximum(seen, 0.1)
+    expected = (mean > 6.0) & (seen > 0.2)
+    assert (found != expected).mean() < 2e-3
+    assert found.any() == (share > 0)
+    inside = np.zeros_like(found)
+    inside[box[0] : box[1], box[2] : box[3]] = True
+    assert not (found & ~inside).any()
+    if found.any():
+        rows, columns = np.nonzero(found)
+        assert box.tolist() == [rows.min(), rows.max() + 1, columns.min(), columns.max() + 1]

@@ -94,7 +94,7 @@ def test_points_are_on_cells_with_all_corners_only() -> None:
 def test_regions_widen_and_are_filled() -> None:
     found, nodes = lattice()
     ring = [(x, y) for x in X[2:6] for y in Y[2:7] if x in X[[2, 5]] or y in Y[[2, 6]]]
-    region = found.nearest(np.array(ring) + 0.1)
+    region = found.nearest(found.place_number(np.array(ring) + 0.1))
     assert region.sum() == 4 * 5
     wider = found.widened(region, 1)
     apart = np.abs((nodes[wider][:, None] - nodes[region][None]) / STEP_MM).sum(axis=2).min(axis=1)
