@@ -171,8 +171,27 @@ def light_data(
 
 
 @njit(**COMPILED)
+def number_nodes(nodes: Any, number: Any) -> Any:
+    """Number the nodes (n, 16) that occur, in their order, in `number` (c,), which holds -1.
+
+    Returns:
+        How many occur.
+    """
+    for k in range(len(nodes)):
+        for tap in range(nodes.shape[1]):
+            number[nodes[k, tap]] = 0
+    count = 0
+    for node in range(len(number)):
+        if number[node] == 0:
+            number[node] = count
+            count += 1
+    return count
+
+
+@njit(**COMPILED)
 def slope_sums(
     nodes: Any,
+    number: Any,
     along: Any,
     across: Any,
     by_slope: Any,
@@ -188,7 +207,8 @@ def slope_sums(
     A datum depends on the heights h by the row a = s_x `along` + s_y `across`.
 
     Args:
-        nodes: (n, 16) of 0 to m - 1.
+        nodes: (n, 16).
+        number: Of each node, 0 to m - 1, see `number_nodes`.
         along: (n, 16).
         across: (n, 16).
         by_slope: (c, n, 2) derivatives s.
@@ -200,6 +220,8 @@ def slope_sums(
         mixed: (m,), to which that of w a d is added.
     """
     channels, bins = weight.shape
+    taps = _TAPS * _TAPS
+    at = np.empty(taps, dtype=np.intp)
     for k in range(bins):
         xx = xy = yy = rx = ry = gx = gy = 0.0
         for c in range(channels):
@@ -211,15 +233,17 @@ def slope_sums(
             ry += w * y * residual[c, k]
             gx += w * x * by_gain[c, k]
             gy += w * y * by_gain[c, k]
-        for a in range(_TAPS * _TAPS):
+        for a in range(taps):
+            at[a] = number[nodes[k, a]]
+        for a in range(taps):
             left_x = xx * along[k, a] + xy * across[k, a]
             left_y = xy * along[k, a] + yy * across[k, a]
-            node = nodes[k, a]
+            node = at[a]
             pull[node] += rx * along[k, a] + ry * across[k, a]
             mixed[node] += gx * along[k, a] + gy * across[k, a]
             matrix[node, node] += (left_x * along[k, a] + left_y * across[k, a]) / 2
-            for b in range(a + 1, _TAPS * _TAPS):
-                matrix[node, nodes[k, b]] += left_x * along[k, b] + left_y * across[k, b]
+            for b in range(a + 1, taps):
+                matrix[node, at[b]] += left_x * along[k, b] + left_y * across[k, b]
     # Each pair of taps was met once.
     for i in range(len(matrix)):
         for j in range(i + 1):

@@ -107,7 +107,7 @@ class PlacedBins:
             gain: Present gain of the light.
             light_error: Standard deviation of the mean change over 1 mm².
         """
-        from gelslim_force.joint.light_kernel import light_data, slope_sums
+        from gelslim_force.joint.light_kernel import light_data, number_nodes, slope_sums
 
         slope = self.taps.slopes(height_mm)
         shape = self.change.shape
@@ -120,12 +120,12 @@ class PlacedBins:
             (law.gamma, SCATTERED), (light_error, _SHADED, _LIMIT),
             by_slope, by_gain, residual, weight, scalars,
         )  # fmt: skip
-        used = np.zeros(len(height_mm), dtype=bool)
-        used[self.taps.nodes] = True
-        nodes, number = np.flatnonzero(used), np.cumsum(used) - 1
-        matrix, pull, mixed = (np.zeros((len(nodes),) * rank) for rank in (2, 1, 1))
+        number = np.full(len(height_mm), -1, dtype=np.intp)
+        count = number_nodes(self.taps.nodes, number)
+        nodes = np.flatnonzero(number >= 0)
+        matrix, pull, mixed = (np.zeros((count,) * rank) for rank in (2, 1, 1))
         slope_sums(
-            number[self.taps.nodes], self.taps.along, self.taps.across,
+            self.taps.nodes, number, self.taps.along, self.taps.across,
             by_slope, by_gain, residual, weight, matrix, pull, mixed,
         )  # fmt: skip
         gain_square, gain_pull, left, seen, by_noise = map(float, scalars)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +34,7 @@ class MarkerRows:
         Args:
             spread: (6, 3p) product of the sums with the covariance of the forces.
         """
-        by_mm = (spread @ self.rows.T) * self.weight
+        by_mm = self._product(spread) * self.weight
         return np.asarray(by_mm.reshape(len(spread), -1, 2))
 
     def response(self, spread: Array, mm_per_px: Array) -> Array:
@@ -58,10 +59,14 @@ class MarkerRows:
         """
         count = len(self.residual) - int(np.count_nonzero(spread.any(axis=0)))
         seen = float(self.weight @ np.square(self.residual)) / max(count, 1)
-        gain = (spread @ self.rows.T) * np.sqrt(self.weight)
+        gain = self._product(spread) * np.sqrt(self.weight)
         return np.asarray(max(0.0, 1.0 - seen) * gain @ gain.T)
+
+    def _product(self, spread: Array) -> Any:
+        """(6, 2m) in the precision of the rows, which are not converted."""
+        return spread.astype(self.rows.dtype) @ self.rows.T
 
 
 def rms_length(rows: Array) -> float:
     """Root mean square of the lengths of vectors (n, k); 0 without any."""
-    return float(np.sqrt((rows**2).sum(axis=1).mean())) if len(rows) else 0.0
+    return math.sqrt(float(np.vdot(rows, rows)) / len(rows)) if len(rows) else 0.0

@@ -130,8 +130,11 @@ class NodeLattice:
 
     def adjacent(self, nodes: Nodes) -> Array:
         """(p, p) with 1 where two of the nodes (p,) are one step along x or y apart."""
-        place = self.place[nodes]
-        return np.asarray(np.abs(place[:, None] - place).sum(axis=2) == 1, dtype=float)
+        from gelslim_force.joint.place_kernel import mark_adjacent
+
+        found = np.zeros((len(nodes), len(nodes)))
+        mark_adjacent(self.place[nodes], found)
+        return found
 
     def slopes_at(self, points_mm: Array) -> SlopeTaps:
         """Slopes along x and along y at (n, 2), by the heights of the nodes."""

@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 STEPS = 400
 TOLERANCE = 1e-4
 _MARGIN = 1.05
+_BLOCK = 64
+"""Rows of a banded product that are multiplied together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +59,17 @@ class NormalEquations:
             heights: (m, 3p) heights per force.
             gain: Expected change of the gain, and its standard deviation.
         """
-        hessian = heights.T @ (light.matrix.astype(heights.dtype) @ heights)
+        from gelslim_force.joint.equations_kernel import add_light
+
         expected, sigma = gain
         own = light.by_gain + sigma**-2
         seen = (light.gain_pull + expected / sigma**2) / own
         sums = np.column_stack([light.pull - light.mixed * seen, light.mixed])
         pull, mixed = (heights.T @ sums.astype(heights.dtype)).T.astype(float)
-        return NormalEquations(
-            self.hessian + hessian - np.outer(mixed, mixed / own), self.slope - pull
-        )
+        product = _banded_product(light.matrix.astype(heights.dtype), heights)
+        hessian = np.empty_like(self.hessian)
+        add_light(self.hessian, heights.T @ product, mixed, 1 / own, hessian)
+        return NormalEquations(hessian, self.slope - pull)
 
     def with_prior(
         self,
@@ -86,13 +90,11 @@ class NormalEquations:
             normal_mpa: Standard deviation of the pressure.
             tangential_mpa: Standard deviation of the tangential traction.
         """
-        laplacian = np.diag(neighbours.sum(axis=1)) - neighbours
-        smooth = laplacian / roughness_mpa**2 / np.outer(area_mm2, area_mm2)
+        from gelslim_force.joint.equations_kernel import add_prior
+
         hessian, slope = self.hessian.copy(), self.slope.copy()
-        for axis, size in enumerate((tangential_mpa, tangential_mpa, normal_mpa)):
-            stiff = smooth + np.diag((size * area_mm2) ** -2.0)
-            hessian[axis::3, axis::3] += stiff
-            slope[axis::3] += stiff @ start[axis::3]
+        sizes = np.array([tangential_mpa, tangential_mpa, normal_mpa])
+        add_prior(neighbours, area_mm2, roughness_mpa, sizes, start, hessian, slope)
         return NormalEquations(hessian, slope)
 
     def solved(self, start: Array, friction: float) -> Array:
@@ -113,13 +115,32 @@ class NormalEquations:
         pressing = np.repeat(force.reshape(-1, 3)[:, 2] < 0, 3)
         found = np.zeros(sums.shape)
         if pressing.any():
-            factor = cho_factor(self.hessian[np.ix_(pressing, pressing)])
-            found[:, pressing] = cho_solve(factor, sums[:, pressing].T).T
+            free = np.flatnonzero(pressing)
+            block = np.ascontiguousarray(self.hessian[free][:, free])
+            # The transposed block, which is the same one, is in the order of LAPACK.
+            factor = cho_factor(block.T, overwrite_a=True, check_finite=False)
+            found[:, free] = cho_solve(factor, sums[:, free].T, check_finite=False).T
         return found
 
     def covariance_of(self, sums: Array, force: Array) -> Array:
         """Covariance (k, k) of linear functions `sums` (k, 3p) of the forces (3p,)."""
         return np.asarray(self.spread_of(sums, force) @ sums.T)
+
+
+def _banded_product(matrix: Any, right: Any) -> Any:
+    """Product of a symmetric matrix (m, m) and (m, q) without most of what is zero.
+
+    Heights of nodes that are far apart share no bin: only a band of the matrix is not zero.
+    """
+    from gelslim_force.joint.equations_kernel import half_width
+
+    size = len(matrix)
+    width, found = half_width(matrix), np.empty_like(right)
+    for first in range(0, size, _BLOCK):
+        last = min(first + _BLOCK, size)
+        band = slice(max(0, first - width), min(size, last + width))
+        np.matmul(matrix[first:last, band], right[band], out=found[first:last])
+    return found
 
 
 def huber(residual: Array, sigma: Array, limit: float) -> Array:

@@ -143,3 +143,13 @@ def turn_taps(
             a, b = along[k, tap], across[k, tap]
             turned_along[k, tap] = (yy * a - yx * b) * over
             turned_across[k, tap] = (xx * b - xy * a) * over
+
+
+@njit(**COMPILED)
+def mark_adjacent(places: Any, found: Any) -> None:
+    """Set `found` (p, p) to 1 where two of the places (p, 2) are one step along an axis apart."""
+    for i in range(len(places)):
+        x, y = places[i, 0], places[i, 1]
+        for j in range(i):
+            if abs(places[j, 0] - x) + abs(places[j, 1] - y) == 1:
+                found[i, j] = found[j, i] = 1.0

@@ -1,0 +1,64 @@
+"""Compiled sums of normal equations. Import this module only where they run (numba)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@njit(**COMPILED)
+def half_width(matrix: Any) -> Any:
+    """Largest distance from the diagonal of an entry of a symmetric matrix (m, m) that is not 0."""
+    size = len(matrix)
+    most = 0
+    for i in range(size):
+        for j in range(i - most):
+            if matrix[i, j] != 0:
+                most = i - j
+                break
+    return most
+
+
+@njit(**COMPILED)
+def add_light(hessian: Any, gram: Any, mixed: Any, over: Any, found: Any) -> None:
+    """Write `hessian` (q, q) + `gram` (q, q) - `over` m mᵀ, with `mixed` m (q,), to `found`."""
+    for i in range(len(mixed)):
+        scaled = over * mixed[i]
+        for j in range(len(mixed)):
+            found[i, j] = hessian[i, j] + gram[i, j] - scaled * mixed[j]
+
+
+@njit(**COMPILED)
+def add_prior(
+    neighbours: Any, area: Any, roughness: Any, sizes: Any, start: Any, hessian: Any, slope: Any
+) -> None:
+    """Add the prior of smooth tractions of limited size.
+
+    Args:
+        neighbours: (p, p) with 1 where nodes are neighbours.
+        area: (p,) of the nodes.
+        roughness: Standard deviation of the difference of the traction of neighbours.
+        sizes: (3,) standard deviation of each component of the traction.
+        start: (3p,) forces.
+        hessian: (3p, 3p), to which it is added.
+        slope: (3p,), to which its gradient at the start is added.
+    """
+    nodes = len(area)
+    for i in range(nodes):
+        count = 0.0
+        for j in range(nodes):
+            if neighbours[i, j] == 0:
+                continue
+            count += neighbours[i, j]
+            stiff = -neighbours[i, j] / (roughness * roughness * area[i] * area[j])
+            for axis in range(3):
+                hessian[3 * i + axis, 3 * j + axis] += stiff
+                slope[3 * i + axis] += stiff * start[3 * j + axis]
+        for axis in range(3):
+            traction = 1 / (sizes[axis] * area[i])
+            stiff = count / (roughness * area[i]) ** 2 + traction * traction
+            hessian[3 * i + axis, 3 * i + axis] += stiff
+            slope[3 * i + axis] += stiff * start[3 * i + axis]
