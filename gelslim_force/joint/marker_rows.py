@@ -46,7 +46,8 @@ class MarkerRows:
         """
         found = np.zeros((len(spread), len(mm_per_px), 2))
         by_mm = self.by_motion(spread)
-        found[:, self.used] = np.einsum("ami,mij->amj", by_mm, mm_per_px[self.used])
+        scale = mm_per_px[self.used]
+        found[:, self.used] = by_mm[..., :1] * scale[:, 0] + by_mm[..., 1:] * scale[:, 1]
         return found
 
     def overstated(self, spread: Array) -> Array:

@@ -68,7 +68,13 @@ class NormalEquations:
         pull, mixed = (heights.T @ sums.astype(heights.dtype)).T.astype(float)
         product = _banded_product(light.matrix.astype(heights.dtype), heights)
         hessian = np.empty_like(self.hessian)
-        add_light(self.hessian, heights.T @ product, mixed, 1 / own, hessian)
+        half = len(mixed) // 2
+        gram = np.empty(hessian.shape, dtype=heights.dtype)
+        # The lower left quarter is the image of the upper right one.
+        np.matmul(heights.T[:half], product, out=gram[:half])
+        np.matmul(heights.T[half:], product[:, half:], out=gram[half:, half:])
+        gram[half:, :half] = gram[:half, half:].T
+        add_light(self.hessian, gram, mixed, 1 / own, hessian)
         return NormalEquations(hessian, self.slope - pull)
 
     def with_prior(
