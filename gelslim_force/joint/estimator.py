@@ -23,6 +23,7 @@ from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
 from gelslim_force.joint.fit_state import FitState, FrameData
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.linearised import Linearised
 from gelslim_force.joint.marker_rows import MarkerRows, rms_length
 from gelslim_force.joint.model_errors import at_edge, by_region, edge_nodes
 from gelslim_force.joint.moved_region import MovedRegion
@@ -46,6 +47,10 @@ _MARKER_LIMIT = 3.0
 _LEAST_NODES = 3
 _SETTLED = 0.01
 """Change of the force, relative to it, after which another linearisation changes little."""
+_HELD_SLOPE = 0.07
+"""Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
+random contacts then differ from those of another linearisation by 0.03 standard deviations in the
+median, and their errors against the truth are as large."""
 _LEAST_ACROSS = 0.1
 """Sensitivity, or difference of those of two channels, that shows a slope across."""
 
@@ -192,9 +197,26 @@ class JointEstimator:
                 pressure = -state.force_n[:, 2] / self.area_mm2
                 least = settings_at(self.settings, self._deepness(state)).least_pressure
                 nodes = pressing_nodes(nodes, pressure, self.neighbours, least)
+                held = self._held(state, np.flatnonzero(nodes))
+                if held is not None:
+                    state, count = held, count - 1
             for _ in range(count):
                 state = self._round(frame, np.flatnonzero(nodes), state)
         return nodes, replace(self._settled(frame, nodes, state), wider_n=wider)
+
+    def _held(self, state: FitState, nodes: Nodes) -> FitState | None:
+        """The forces on fewer nodes by the linear data of the last round.
+
+        None where the gel moves so far that these do not hold, and for deep contacts.
+        """
+        if state.data is None or self._deepness(state) > 0:
+            return None
+        data = state.data.on(nodes)
+        found = self._solved(data)
+        slope = np.abs(found.displacement_mm - data.moved_mm).max() / self.lattice.step_mm.min()
+        if slope > _HELD_SLOPE:
+            return None
+        return replace(found, markers=data.markers.after(found.force_n[nodes].ravel() - data.start))
 
     def _settled(self, frame: FrameData, nodes: Mask, state: FitState) -> FitState:
         """A deep contact after as many more linearisations as it needs."""
@@ -245,38 +267,54 @@ class JointEstimator:
 
     def _round(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
         """Linearise at the state, and solve."""
-        start, offset = state.force_n[nodes].ravel(), self._offset(state)
-        chosen, near = self.settings, np.zeros(len(self.points_mm), dtype=bool)
+        return self._solved(self._linearised(frame, nodes, state))
+
+    def _linearised(self, frame: FrameData, nodes: Nodes, state: FitState) -> Linearised:
+        """The data near the contact, linear about the state."""
+        offset, near = self._offset(state), np.zeros(len(self.points_mm), dtype=bool)
         near[nodes] = True
         moved = self._linear(nodes, near, state) + offset
         markers = self._marker_rows(frame, near, moved)
-        equations = NormalEquations.of(len(start))
-        equations = equations.with_rows(markers.rows, markers.residual, markers.weight)
-        light = self._light(frame, near, moved, state)
+        data = NormalEquations.of(3 * len(nodes))
+        data = data.with_rows(markers.rows, markers.residual, markers.weight)
+        light, heights = self._light(frame, near, moved, state), None
         if light is not None:
             heights = self.responses.of_heights(nodes, light.nodes)
-            equations = equations.with_light(light, heights, (1 - state.gain, chosen.gain_sigma))
-        young, area = self.youngs_modulus_mpa, self.area_mm2[nodes]
-        pressure = -state.force_n[nodes, 2] / area
-        equations = equations.with_prior(
-            start,
+            gain = 1 - state.gain, self.settings.gain_sigma
+            data = data.with_light(light, heights, gain)
+        return Linearised(
+            nodes,
+            state.force_n[nodes].ravel(),
+            moved,
+            offset,
+            state.gain,
+            self._deepness(state),
+            data,
+            markers,
+            light,
+            heights,
+        )
+
+    def _solved(self, data: Linearised) -> FitState:
+        """The forces that the linear data and the prior give."""
+        chosen, nodes, young = self.settings, data.nodes, self.youngs_modulus_mpa
+        area = self.area_mm2[nodes]
+        equations = data.equations.with_prior(
+            data.start,
             self.lattice.adjacent(nodes),
             area,
-            roughness_mpa(chosen, self._deepness(state), young, pressure),
+            roughness_mpa(chosen, data.deepness, young, -data.start[2::3] / area),
             chosen.normal_stress * young,
             chosen.tangential_stress * young,
         )
-        found = equations.solved(start, chosen.friction)
-        force = np.zeros_like(state.force_n)
+        found = equations.solved(data.start, chosen.friction)
+        force = np.zeros_like(self.points_mm)
         force[nodes] = found.reshape(-1, 3)
         linear = self.responses.displacement(nodes, force[nodes])
-        motion = linear + offset
-        if light is None:
-            return FitState(force, motion, state.gain, linear, equations, markers)
-        higher = np.asarray(heights @ (found - start).astype(heights.dtype), dtype=float)
-        gain = light.gain_after(higher, chosen.gain_sigma)
-        left = light.unexplained(higher)
-        return FitState(force, motion, gain, linear, equations, markers, left)
+        gain, left = data.after(found, chosen.gain_sigma)
+        return FitState(
+            force, linear + data.offset_mm, gain, linear, equations, data.markers, left, data
+        )
 
     def _linear(self, nodes: Nodes, near: Mask, state: FitState) -> Array:
         """Motion (c, 3) of a linear gel under the forces of the state on the nodes `near` (c,).

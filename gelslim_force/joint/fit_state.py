@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.joint.light_view import SeenLight
+from gelslim_force.joint.linearised import Linearised
 from gelslim_force.joint.marker_rows import MarkerRows
 from gelslim_force.joint.normal_equations import NormalEquations
 from gelslim_force.motion.marker_motion import MarkerRays
@@ -42,6 +43,7 @@ class FitState:
         equations: That it solves; None for a start.
         markers: Data of the markers that it explains; None for a start.
         unexplained: Share of the change of light that is left.
+        data: Linear data that it solves; None for a start.
         wider_n: (c, 3) forces before the last nodes were removed; None where none were.
     """
 
@@ -52,6 +54,7 @@ class FitState:
     equations: NormalEquations | None = None
     markers: MarkerRows | None = None
     unexplained: float = 0.0
+    data: Linearised | None = None
     wider_n: Array | None = None
 
     def near(self, other: FitState, share: float) -> bool:

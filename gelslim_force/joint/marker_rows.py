@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,11 @@ class MarkerRows:
     rows: Any
     residual: Array
     weight: Array
+
+    def after(self, step_n: Array) -> MarkerRows:
+        """The same with the residuals that are left after a change (3p,) of the forces."""
+        moved = self.rows @ step_n.astype(self.rows.dtype)
+        return replace(self, residual=self.residual - moved)
 
     def by_motion(self, spread: Array) -> Array:
         """Change (6, m, 2) per mm of six sums of the forces where a used marker moves further.

@@ -12,9 +12,11 @@ from scipy import ndimage
 
 from gelslim_force.joint.light_kernel import gather_heights, gather_markers, light_data
 from gelslim_force.joint.light_sums import placed_bins
+from gelslim_force.joint.linearised import Linearised
 from gelslim_force.joint.marker_kernel import marker_data
+from gelslim_force.joint.marker_rows import MarkerRows
 from gelslim_force.joint.node_lattice import NodeLattice
-from gelslim_force.joint.normal_equations import huber
+from gelslim_force.joint.normal_equations import NormalEquations, huber
 from gelslim_force.joint.region_kernel import bins_above_noise
 from gelslim_optics.light.light_law import SCATTERED, LightLaw
 
@@ -193,3 +195,33 @@ def test_bins_that_changed_are_those_of_filters_of_the_picture(share: float) -> 
     if found.any():
         rows, columns = np.nonzero(found)
         assert box.tolist() == [rows.min(), rows.max() + 1, columns.min(), columns.max() + 1]
+
+
+def equations(rows: Array, values: Array) -> NormalEquations:
+    """Of rows (n, 3p) and values (n,) with unit weight."""
+    return NormalEquations.of(rows.shape[1]).with_rows(rows, values, np.ones(len(values)))
+
+
+def test_linear_data_on_fewer_nodes_are_those_without_the_others() -> None:
+    """The change of the forces on the others, to zero, is taken from the data."""
+    rng = np.random.default_rng(10)
+    rows, heights = rng.normal(size=(40, 18)), rng.normal(size=(7, 18))
+    residual, start = rng.normal(size=40), rng.normal(size=18)
+    moved = np.zeros((6, 3))
+    markers = MarkerRows(np.arange(20), rows, residual, np.ones(40))
+    data = Linearised(
+        np.array([3, 5, 8, 9, 11, 14]), start, moved, moved, 1.0, 0.0,
+        equations(rows, residual), markers, None, heights, np.zeros(7),
+    )  # fmt: skip
+    found = data.on(np.array([5, 9, 14]))
+    kept = np.repeat([False, True, False, True, False, True], 3)
+    left = residual + rows[:, ~kept] @ start[~kept]
+    np.testing.assert_allclose(found.start, start[kept])
+    np.testing.assert_allclose(found.markers.residual, left, atol=1e-12)
+    np.testing.assert_allclose(found.higher_mm, -heights[:, ~kept] @ start[~kept], atol=1e-12)
+    expected = equations(rows[:, kept], left)
+    np.testing.assert_allclose(found.equations.hessian, expected.hessian, atol=1e-12)
+    np.testing.assert_allclose(found.equations.slope, expected.slope, atol=1e-12)
+    step = rng.normal(size=9)
+    after = found.markers.after(step).residual
+    np.testing.assert_allclose(after, left - rows[:, kept] @ step, atol=1e-12)
