@@ -18,12 +18,12 @@ FULLY = 1.4
 """Depth from which a contact is wholly deep, over that from which it begins to be."""
 
 
-def deepness(displacement_mm: Array, deep_mm: float) -> float:
+def deepness(height_mm: Array, deep_mm: float) -> float:
     """0 for contacts up to the depth `deep_mm`, growing to 1 at `FULLY` times that.
 
-    `displacement_mm` is the motion (c, 3) of the surface nodes.
+    `height_mm` (n,) is the motion of the nodes in contact, or of more nodes, along z.
     """
-    depth = -float(displacement_mm[:, 2].min(initial=0.0))
+    depth = -float(height_mm.min(initial=0.0))
     return min(max((depth / deep_mm - 1.0) / (FULLY - 1.0), 0.0), 1.0)
 
 

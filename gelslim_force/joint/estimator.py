@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
-from gelslim_force.joint.fit_state import FitState, FrameData
+from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
 from gelslim_force.joint.linearised import Linearised
@@ -71,7 +71,7 @@ class JointForces:
         gain: Gain of the light found in this frame.
         unexplained: Share of the change of light in the region that the forces do not explain.
         shown: (c,) nodes whose slope the light shows; none without light.
-        linear_mm: (c, 3) motion of a linear gel under the forces; None where it is not known.
+        motion: Of the surface nodes.
     """
 
     force_n: Array
@@ -84,12 +84,12 @@ class JointForces:
     gain: float
     unexplained: float
     shown: Mask
-    linear_mm: Array | None = None
+    motion: GelMotion
 
     @property
     def state(self) -> FitState:
         """What the fit of the next frame starts from."""
-        return FitState(self.force_n, self.displacement_mm, self.gain, self.linear_mm)
+        return FitState(self.force_n, self.motion, self.gain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +168,8 @@ class JointEstimator:
         if region.sum() < _LEAST_NODES:
             return None
         if last is None or not (last.region & region).any():
-            still = np.zeros_like(self.points_mm)
-            start = FitState(still, still, 1.0, still)
+            still, none = np.zeros_like(self.points_mm), np.zeros(0, dtype=np.intp)
+            start = FitState(still, GelMotion(self.responses, none, still[none], still), 1.0)
             begun = self._rounds(frame, region, start, self.settings.rounds)
         else:
             begun = last.region, last.state
@@ -227,7 +227,7 @@ class JointEstimator:
         return state
 
     def _deepness(self, state: FitState) -> float:
-        return deepness(state.displacement_mm, self.deep_mm)
+        return deepness(state.near_mm, self.deep_mm)
 
     @cached_property
     def _mm_per_px(self) -> Array:
@@ -310,27 +310,29 @@ class JointEstimator:
         found = equations.solved(data.start, chosen.friction)
         force = np.zeros_like(self.points_mm)
         force[nodes] = found.reshape(-1, 3)
-        linear = self.responses.displacement(nodes, force[nodes])
-        gain, left = data.after(found, chosen.gain_sigma)
-        return FitState(
-            force, linear + data.offset_mm, gain, linear, equations, data.markers, left, data
-        )
+        motion = GelMotion(self.responses, nodes, force[nodes], data.offset_mm)
+        light, higher = data.light, data.heights_after(found)
+        if light is None or higher is None:
+            return FitState(force, motion, data.gain, equations, data.markers, 0.0, data)
+        gain, left = light.gain_after(higher, chosen.gain_sigma), light.unexplained(higher)
+        height = data.moved_mm[light.nodes, 2] + higher
+        return FitState(force, motion, gain, equations, data.markers, left, data, height)
 
     def _linear(self, nodes: Nodes, near: Mask, state: FitState) -> Array:
         """Motion (c, 3) of a linear gel under the forces of the state on the nodes `near` (c,).
 
-        Most forces act there, so that what the others move is taken off.
+        Most forces act there: where the motion under all is known, that by the others is taken off.
         """
-        if state.linear_mm is None:
-            return self.responses.displacement(nodes, state.force_n[nodes])
         others = np.flatnonzero(state.force_n.any(axis=1) & ~near)
         if not len(others):
-            return state.linear_mm
-        return state.linear_mm - self.responses.displacement(others, state.force_n[others])
+            return state.motion.linear_mm
+        if not state.motion.is_known:
+            return self.responses.displacement(nodes, state.force_n[nodes])
+        return state.motion.linear_mm - self.responses.displacement(others, state.force_n[others])
 
     def _offset(self, state: FitState) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
-        depth = -float(state.displacement_mm[:, 2].min(initial=0.0))
+        depth = -float(state.near_mm.min(initial=0.0))
         if self.strained is None or depth <= self.strained_from_mm:
             return np.zeros_like(state.force_n)
         whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
@@ -410,7 +412,7 @@ class JointEstimator:
             state.gain,
             state.unexplained,
             self._shown(frame.seen),
-            state.linear_mm,
+            state.motion,
         )
 
     def _shown(self, seen: SeenLight | None) -> Mask:

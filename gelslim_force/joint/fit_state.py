@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from gelslim_force.joint.light_view import SeenLight
 from gelslim_force.joint.linearised import Linearised
 from gelslim_force.joint.marker_rows import MarkerRows
 from gelslim_force.joint.normal_equations import NormalEquations
+from gelslim_force.joint.responses import Responses
 from gelslim_force.motion.marker_motion import MarkerRays
 
 Array = NDArray[np.float64]
@@ -32,30 +34,72 @@ class FrameData:
 
 
 @dataclass(frozen=True, eq=False)
+class GelMotion:
+    """Motion of the surface under forces; it is computed when it is asked for.
+
+    Attributes:
+        responses: Of the gel.
+        nodes: (p,) nodes with forces.
+        force_n: (p, 3) on them.
+        offset_mm: (c, 3) what a gel that is not linear moves further.
+    """
+
+    responses: Responses
+    nodes: NDArray[np.intp]
+    force_n: Array
+    offset_mm: Array
+
+    @cached_property
+    def linear_mm(self) -> Array:
+        """(c, 3) of a linear gel."""
+        return self.responses.displacement(self.nodes, self.force_n)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it is computed already."""
+        return "linear_mm" in self.__dict__
+
+    @cached_property
+    def displacement_mm(self) -> Array:
+        """(c, 3) of the gel."""
+        return self.linear_mm + self.offset_mm
+
+
+@dataclass(frozen=True, eq=False)
 class FitState:
     """An estimate.
 
     Attributes:
         force_n: (c, 3) on the surface nodes.
-        displacement_mm: (c, 3) of the surface nodes.
+        motion: Of the surface nodes.
         gain: Of the light.
-        linear_mm: (c, 3) motion of a linear gel under the forces; None where it is not known.
         equations: That it solves; None for a start.
         markers: Data of the markers that it explains; None for a start.
         unexplained: Share of the change of light that is left.
         data: Linear data that it solves; None for a start.
+        height_mm: (m,) of the nodes in and around the contact; None where all have to be looked at.
         wider_n: (c, 3) forces before the last nodes were removed; None where none were.
     """
 
     force_n: Array
-    displacement_mm: Array
+    motion: GelMotion
     gain: float
-    linear_mm: Array | None = None
     equations: NormalEquations | None = None
     markers: MarkerRows | None = None
     unexplained: float = 0.0
     data: Linearised | None = None
+    height_mm: Array | None = None
     wider_n: Array | None = None
+
+    @property
+    def displacement_mm(self) -> Array:
+        """(c, 3) motion of the surface nodes."""
+        return self.motion.displacement_mm
+
+    @property
+    def near_mm(self) -> Array:
+        """Heights (m,) of the nodes in and around the contact, or of all."""
+        return self.displacement_mm[:, 2] if self.height_mm is None else self.height_mm
 
     def near(self, other: FitState, share: float) -> bool:
         """Whether the resultant differs from another one by less than a share of it."""

@@ -46,13 +46,12 @@ class Linearised:
     heights: Any
     higher_mm: Array | float = 0.0
 
-    def after(self, force: Array, gain_sigma: float) -> tuple[float, float]:
-        """Gain of the light, and share of its change that is left, with forces (3p,)."""
+    def heights_after(self, force: Array) -> Array | None:
+        """Change (m,) of the heights from the estimate to forces (3p,); None without light."""
         if self.light is None:
-            return self.gain, 0.0
+            return None
         step = (force - self.start).astype(self.heights.dtype)
-        higher = self.higher_mm + self.heights @ step
-        return self.light.gain_after(higher, gain_sigma), self.light.unexplained(higher)
+        return np.asarray(self.higher_mm + self.heights @ step, dtype=float)
 
     def on(self, nodes: Nodes) -> Linearised:
         """The same data where only some of the nodes (q,) may press; the others bear no force."""

@@ -107,8 +107,8 @@ class NormalEquations:
         """(3p,) forces in Coulomb's cone that minimise, from those at the start (3p,)."""
         from ifem_export.inverse.contact_fit_kernel import descend, largest_eigenvalue
 
-        step = 1.0 / (_MARGIN * largest_eigenvalue(self.hessian))
         gram, slope = (a.astype(np.float32) for a in (self.hessian, self.slope))
+        step = 1.0 / (_MARGIN * largest_eigenvalue(gram))
         force = start.astype(np.float32)
         descend(gram, slope, force, friction, np.float32(step), TOLERANCE, STEPS)
         return force.astype(float)

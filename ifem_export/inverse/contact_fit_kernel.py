@@ -18,12 +18,14 @@ def largest_eigenvalue(gram: Any) -> Any:
     """Largest eigenvalue of `gram` (3n, 3n), estimated from below by Lanczos steps.
 
     The values at the start differ from node to node: from a uniform force the steps would not meet
-    the modes that alternate, and a fit with too long a step diverges.
+    the modes that alternate, and a fit with too long a step diverges. The products are made in the
+    precision of `gram`.
     """
     size = gram.shape[0]
     most = min(size, LANCZOS_STEPS)
     matrix = np.zeros((most, most))
-    x, before, beta = np.empty(size), np.zeros(size), 0.0
+    x, before = np.empty(size, dtype=gram.dtype), np.zeros(size, dtype=gram.dtype)
+    beta = x.dtype.type(0.0)
     for k in range(size):
         x[k] = (0.3, 0.2, -1.0)[k % 3] + ((k + 1) * GOLDEN) % 1.0 - 0.5
     x /= math.sqrt(x @ x)
@@ -32,7 +34,7 @@ def largest_eigenvalue(gram: Any) -> Any:
         alpha = x @ y
         matrix[step, step] = alpha
         y -= alpha * x + beta * before
-        beta = math.sqrt(y @ y)
+        beta = x.dtype.type(math.sqrt(y @ y))
         if step + 1 == most or beta <= 1e-9 * matrix[0, 0]:
             break
         matrix[step, step + 1] = matrix[step + 1, step] = beta

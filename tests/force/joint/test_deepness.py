@@ -23,7 +23,7 @@ def test_deepness_grows_from_the_depth_on() -> None:
     motion = np.zeros((3, 3))
     for depth, expected in ((0.0, 0.0), (0.2, 0.0), (0.24, 0.5), (0.2 * FULLY, 1.0), (0.9, 1.0)):
         motion[1, 2] = -depth
-        assert deepness(motion, 0.2) == pytest.approx(expected)
+        assert deepness(motion[:, 2], 0.2) == pytest.approx(expected)
 
 
 def test_settings_of_shallow_contacts_are_those_given() -> None:
