@@ -62,3 +62,13 @@ def add_prior(
             stiff = count / (roughness * area[i]) ** 2 + traction * traction
             hessian[3 * i + axis, 3 * i + axis] += stiff
             slope[3 * i + axis] += stiff * start[3 * i + axis]
+
+
+@njit(**COMPILED)
+def take_nodes(rows: Any, nodes: Any, found: Any) -> None:
+    """Write the three columns of each node (q,) of `rows` (n, 3p) to `found` (n, 3q)."""
+    for i in range(len(rows)):
+        row, out = rows[i], found[i]
+        for k in range(len(nodes)):
+            for axis in range(3):
+                out[3 * k + axis] = row[3 * nodes[k] + axis]

@@ -30,8 +30,10 @@ class Linearised:
         equations: Of the data, without a prior.
         markers: Data of the markers.
         light: Data of the light; None without light.
-        heights: (m, 3p) heights of the nodes of `light` per force; None without light.
-        higher_mm: (m,) change of these heights from the estimate to the start.
+        heights: (m, 3r) heights of the nodes of `light` per force on the r nodes of the estimate;
+            None without light.
+        step: (3r,) change of the forces from the estimate to the start; None for no change.
+        free: (3p,) numbers of the forces sought among those; None for all.
     """
 
     nodes: Nodes
@@ -44,38 +46,41 @@ class Linearised:
     markers: MarkerRows
     light: LightSums | None
     heights: Any
-    higher_mm: Array | float = 0.0
+    step: Array | None = None
+    free: Nodes | None = None
 
     def heights_after(self, force: Array) -> Array | None:
         """Change (m,) of the heights from the estimate to forces (3p,); None without light."""
         if self.light is None:
             return None
-        step = (force - self.start).astype(self.heights.dtype)
-        return np.asarray(self.higher_mm + self.heights @ step, dtype=float)
+        step = force - self.start
+        if self.step is not None:
+            whole = self.step.copy()
+            whole[self.free] = step
+            step = whole
+        return np.asarray(self.heights @ step.astype(self.heights.dtype), dtype=float)
 
     def on(self, nodes: Nodes) -> Linearised:
-        """The same data where only some of the nodes (q,) may press; the others bear no force."""
-        kept = np.isin(self.nodes, nodes, assume_unique=True)
-        free, lost = (np.flatnonzero(np.repeat(part, 3)) for part in (kept, ~kept))
-        less = -self.start[lost]
-        own = self.equations.hessian[free]
-        slope = self.equations.slope[free] + own[:, lost] @ less
-        rows = self.markers.rows
-        markers = replace(
-            self.markers,
-            rows=np.ascontiguousarray(rows[:, free]),
-            residual=self.markers.residual - rows[:, lost] @ less.astype(rows.dtype),
-        )
-        heights, higher = self.heights, self.higher_mm
-        if heights is not None:
-            higher = higher + heights[:, lost] @ less.astype(heights.dtype)
-            heights = np.ascontiguousarray(heights[:, free])
+        """The same data where only some of the nodes (q,) may press; the others bear no force.
+
+        The data must be those of all nodes.
+        """
+        from gelslim_force.joint.equations_kernel import take_nodes
+
+        kept = np.flatnonzero(np.isin(self.nodes, nodes, assume_unique=True))
+        free = (3 * kept[:, None] + np.arange(3)).ravel()
+        step = -self.start
+        step[free] = 0.0
+        hessian, own = self.equations.hessian, np.empty((len(free), len(free)))
+        take_nodes(hessian[free], kept, own)
+        rows = np.empty((len(self.markers.rows), len(free)), dtype=self.markers.rows.dtype)
+        take_nodes(self.markers.rows, kept, rows)
         return replace(
             self,
             nodes=nodes,
             start=self.start[free],
-            equations=NormalEquations(np.ascontiguousarray(own[:, free]), slope),
-            markers=markers,
-            heights=heights,
-            higher_mm=higher,
+            equations=NormalEquations(own, (self.equations.slope + hessian @ step)[free]),
+            markers=replace(self.markers.after(step), rows=rows),
+            step=step,
+            free=free,
         )

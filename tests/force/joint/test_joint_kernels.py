@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gelslim_force.joint.light_kernel import gather_heights, gather_markers, light_data
-from gelslim_force.joint.light_sums import placed_bins
+from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.linearised import Linearised
 from gelslim_force.joint.marker_kernel import marker_data
 from gelslim_force.joint.marker_rows import MarkerRows
@@ -69,6 +69,7 @@ def test_bins_are_placed_where_their_lines_of_sight_meet_the_gel(seed: int) -> N
     assert 20 < kept.sum() < 300
     np.testing.assert_array_equal(found.change, seen.log_change.reshape(2, -1)[:, kept])
     np.testing.assert_array_equal(found.share, seen_from.share.reshape(2, 2, -1)[..., kept])
+    assert found.relief is not None
     np.testing.assert_allclose(found.relief, nodes.values_at(relief, places[kept]).T, atol=1e-12)
     flat, height = nodes.slopes_at(places[kept]), rng.normal(0, 0.1, count)
     along, across = flat.along, flat.across
@@ -209,16 +210,21 @@ def test_linear_data_on_fewer_nodes_are_those_without_the_others() -> None:
     residual, start = rng.normal(size=40), rng.normal(size=18)
     moved = np.zeros((6, 3))
     markers = MarkerRows(np.arange(20), rows, residual, np.ones(40))
+    nodes, light = np.array([3, 5, 8, 9, 11, 14]), cast(LightSums, SimpleNamespace())
     data = Linearised(
-        np.array([3, 5, 8, 9, 11, 14]), start, moved, moved, 1.0, 0.0,
-        equations(rows, residual), markers, None, heights, np.zeros(7),
+        nodes, start, moved, moved, 1.0, 0.0,
+        equations(rows, residual), markers, light, heights,
     )  # fmt: skip
     found = data.on(np.array([5, 9, 14]))
     kept = np.repeat([False, True, False, True, False, True], 3)
     left = residual + rows[:, ~kept] @ start[~kept]
     np.testing.assert_allclose(found.start, start[kept])
     np.testing.assert_allclose(found.markers.residual, left, atol=1e-12)
-    np.testing.assert_allclose(found.higher_mm, -heights[:, ~kept] @ start[~kept], atol=1e-12)
+    force, change = rng.normal(size=9), -start
+    change[kept] += force
+    higher = found.heights_after(force)
+    assert higher is not None
+    np.testing.assert_allclose(higher, heights @ change, atol=1e-12)
     expected = equations(rows[:, kept], left)
     np.testing.assert_allclose(found.equations.hessian, expected.hessian, atol=1e-12)
     np.testing.assert_allclose(found.equations.slope, expected.slope, atol=1e-12)
