@@ -216,7 +216,9 @@ class JointEstimator:
         slope = np.abs(found.displacement_mm - data.moved_mm).max() / self.lattice.step_mm.min()
         if slope > _HELD_SLOPE:
             return None
-        return replace(found, markers=data.markers.after(found.force_n[nodes].ravel() - data.start))
+        # As in every round, residuals are those of the forces before it.
+        before = state.force_n[nodes].ravel() - data.start
+        return replace(found, markers=data.markers.after(before))
 
     def _settled(self, frame: FrameData, nodes: Mask, state: FitState) -> FitState:
         """A deep contact after as many more linearisations as it needs."""
