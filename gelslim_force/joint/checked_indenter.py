@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gelslim_force.contact.normal_motion import IndenterSource
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch
-from gelslim_force.joint.estimator import JointForces
+from gelslim_force.joint.fit_state import JointForces
 from gelslim_force.joint.unknown_shape import LARGEST_UNEXPLAINED, UnknownShape
 
 Array = NDArray[np.float64]

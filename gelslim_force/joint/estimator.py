@@ -20,18 +20,17 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
-from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion
+from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
-from gelslim_force.joint.linearised import Linearised
 from gelslim_force.joint.marker_rows import MarkerRows, rms_length
 from gelslim_force.joint.model_errors import at_edge, by_region, edge_nodes
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
-from gelslim_force.joint.normal_equations import NormalEquations
+from gelslim_force.joint.normal_equations import Linearised, NormalEquations
 from gelslim_force.joint.off_design import OffDesign
-from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes
+from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes, rise_of
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.variance_components import scaled_covariance
@@ -50,46 +49,7 @@ _SETTLED = 0.01
 _HELD_SLOPE = 0.07
 """Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
 random contacts then differ from those of another linearisation by 0.03 standard deviations in the
-median, and their errors against the truth are as large."""
-_LEAST_ACROSS = 0.1
-"""Sensitivity, or difference of those of two channels, that shows a slope across."""
-
-
-@dataclass(frozen=True, eq=False)
-class JointForces:
-    """Forces of one frame.
-
-    Attributes:
-        force_n: (c, 3) on the surface nodes.
-        displacement_mm: (c, 3) of the surface nodes.
-        region: (c,) nodes in contact.
-        seen: (c,) nodes that the picture showed as possibly in contact.
-        covariance: (6, 6) of force and torque about the origin; the gel is taken as specified.
-        by_marker: (6, n, 2) their change in N/px and N mm/px where a marker is seen elsewhere.
-        by_gel: (p, 6) their change by ln thickness and by Poisson's ratio of the gel; None where it
-            is not computed.
-        gain: Gain of the light found in this frame.
-        unexplained: Share of the change of light in the region that the forces do not explain.
-        shown: (c,) nodes whose slope the light shows; none without light.
-        motion: Of the surface nodes.
-    """
-
-    force_n: Array
-    displacement_mm: Array
-    region: Mask
-    seen: Mask
-    covariance: Array
-    by_marker: Array
-    by_gel: Array | None
-    gain: float
-    unexplained: float
-    shown: Mask
-    motion: GelMotion
-
-    @property
-    def state(self) -> FitState:
-        """What the fit of the next frame starts from."""
-        return FitState(self.force_n, self.motion, self.gain)
+median, and the root mean square of their errors against the truth by 2 % at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,24 +204,14 @@ class JointEstimator:
     def _region(self, frame: FrameData) -> Mask:
         """(c,) nodes that the frame shows as possibly in contact."""
         if self.light is not None and frame.seen is not None:
-            rise = self._rise(self.light, frame.seen)
+            assert self.law is not None
+            by_slope = self.law.sensitivity[:, 1] @ self.light.mean_share
+            rise = rise_of(by_slope, frame.seen.log_change)
             return contact_nodes(frame.seen.shading, rise, self.light.place, self.lattice)
         if self.moved is None:
             return np.zeros(len(self.points_mm), dtype=bool)
         lateral = self.markers.lateral_motion(frame.markers.positions_px)
         return self.moved.nodes(lateral, self._noise_mm(frame), self.settings.marker_mm)
-
-    def _rise(self, light: LightView, seen: SeenLight) -> Array | None:
-        """(rows, columns) change that grows with a rise along y; None where no light tells it."""
-        assert self.law is not None
-        by_slope = self.law.sensitivity[:, 1] @ light.mean_share
-        if len(by_slope) == 1:
-            falling, change = by_slope[0], seen.log_change[0]
-        else:
-            falling, change = by_slope[0] - by_slope[1], seen.log_change[0] - seen.log_change[1]
-        if abs(falling) < _LEAST_ACROSS:
-            return None
-        return np.asarray(-np.sign(falling) * change)
 
     def _noise_mm(self, frame: FrameData) -> Array:
         """(n,) standard deviation of the markers' places on the gel by the noise of the image."""
@@ -275,7 +225,7 @@ class JointEstimator:
         """The data near the contact, linear about the state."""
         offset, near = self._offset(state), np.zeros(len(self.points_mm), dtype=bool)
         near[nodes] = True
-        moved = self._linear(nodes, near, state) + offset
+        moved = state.linear_mm(nodes, near) + offset
         markers = self._marker_rows(frame, near, moved)
         data = NormalEquations.of(3 * len(nodes))
         data = data.with_rows(markers.rows, markers.residual, markers.weight)
@@ -284,17 +234,9 @@ class JointEstimator:
             heights = self.responses.of_heights(nodes, light.nodes)
             gain = 1 - state.gain, self.settings.gain_sigma
             data = data.with_light(light, heights, gain)
+        start, deep = state.force_n[nodes].ravel(), self._deepness(state)
         return Linearised(
-            nodes,
-            state.force_n[nodes].ravel(),
-            moved,
-            offset,
-            state.gain,
-            self._deepness(state),
-            data,
-            markers,
-            light,
-            heights,
+            nodes, start, moved, offset, state.gain, deep, data, markers, light, heights
         )
 
     def _solved(self, data: Linearised) -> FitState:
@@ -320,18 +262,6 @@ class JointEstimator:
         height = data.moved_mm[light.nodes, 2] + higher
         return FitState(force, motion, gain, equations, data.markers, left, data, height)
 
-    def _linear(self, nodes: Nodes, near: Mask, state: FitState) -> Array:
-        """Motion (c, 3) of a linear gel under the forces of the state on the nodes `near` (c,).
-
-        Most forces act there: where the motion under all is known, that by the others is taken off.
-        """
-        others = np.flatnonzero(state.force_n.any(axis=1) & ~near)
-        if not len(others):
-            return state.motion.linear_mm
-        if not state.motion.is_known:
-            return self.responses.displacement(nodes, state.force_n[nodes])
-        return state.motion.linear_mm - self.responses.displacement(others, state.force_n[others])
-
     def _offset(self, state: FitState) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
         depth = -float(state.near_mm.min(initial=0.0))
@@ -345,8 +275,6 @@ class JointEstimator:
 
         What is not resolved: a share of the motion of all, and of each marker's `bending`.
         """
-        from gelslim_force.joint.marker_kernel import marker_data
-
         chosen = self.settings
         wide = self.lattice.widened(near, chosen.marker_reach)[self.marker_node]
         used = np.flatnonzero(wide & frame.markers.known)
@@ -354,13 +282,9 @@ class JointEstimator:
         lateral = frame.markers.lateral(used, model[used, 2])
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
         share = chosen.marker_share * rms_length(model[used])
-        residual, weight = np.empty((2, 2 * len(used)))
-        marker_data(
-            used, lateral, model, bent, self.by_height, self._noise_mm(frame),
-            (math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT),
-            residual, weight,
-        )  # fmt: skip
-        return MarkerRows(used, rows, residual, weight)
+        errors = math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT
+        noise = self._noise_mm(frame)
+        return MarkerRows.of(used, rows, lateral, (model, bent, self.by_height, noise), errors)
 
     @cached_property
     def _to_markers(self) -> sparse.csr_array:

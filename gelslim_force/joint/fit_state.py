@@ -1,4 +1,4 @@
-"""What a fit of contact forces starts from: the data of a frame, and the last estimate."""
+"""What a fit of contact forces starts from, and what it finds."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.joint.light_view import SeenLight
-from gelslim_force.joint.linearised import Linearised
 from gelslim_force.joint.marker_rows import MarkerRows
-from gelslim_force.joint.normal_equations import NormalEquations
+from gelslim_force.joint.normal_equations import Linearised, NormalEquations
 from gelslim_force.joint.responses import Responses
 from gelslim_force.motion.marker_motion import MarkerRays
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,61 @@ class FitState:
         """Heights (m,) of the nodes in and around the contact, or of all."""
         return self.displacement_mm[:, 2] if self.height_mm is None else self.height_mm
 
+    def linear_mm(self, nodes: NDArray[np.intp], near: NDArray[np.bool_]) -> Array:
+        """Motion (c, 3) of a linear gel under the forces on some nodes only.
+
+        Most forces act there: where the motion under all is known, that by the others is taken off.
+
+        Args:
+            nodes: (p,) the nodes.
+            near: (c,) the same as a mask.
+        """
+        motion, move = self.motion, self.motion.responses.displacement
+        others = np.flatnonzero(self.force_n.any(axis=1) & ~near)
+        if not len(others):
+            return motion.linear_mm
+        if not motion.is_known:
+            return move(nodes, self.force_n[nodes])
+        return motion.linear_mm - move(others, self.force_n[others])
+
     def near(self, other: FitState, share: float) -> bool:
         """Whether the resultant differs from another one by less than a share of it."""
         force, change = self.force_n.sum(axis=0), (self.force_n - other.force_n).sum(axis=0)
         return bool(np.linalg.norm(change) < share * np.linalg.norm(force))
+
+
+@dataclass(frozen=True, eq=False)
+class JointForces:
+    """Forces of one frame.
+
+    Attributes:
+        force_n: (c, 3) on the surface nodes.
+        displacement_mm: (c, 3) of the surface nodes.
+        region: (c,) nodes in contact.
+        seen: (c,) nodes that the picture showed as possibly in contact.
+        covariance: (6, 6) of force and torque about the origin; the gel is taken as specified.
+        by_marker: (6, n, 2) their change in N/px and N mm/px where a marker is seen elsewhere.
+        by_gel: (p, 6) their change by ln thickness and by Poisson's ratio of the gel; None where it
+            is not computed.
+        gain: Gain of the light found in this frame.
+        unexplained: Share of the change of light in the region that the forces do not explain.
+        shown: (c,) nodes whose slope the light shows; none without light.
+        motion: Of the surface nodes.
+    """
+
+    force_n: Array
+    displacement_mm: Array
+    region: Mask
+    seen: Mask
+    covariance: Array
+    by_marker: Array
+    by_gel: Array | None
+    gain: float
+    unexplained: float
+    shown: Mask
+    motion: GelMotion
+
+    @property
+    def state(self) -> FitState:
+        """What the fit of the next frame starts from."""
+        return FitState(self.force_n, self.motion, self.gain)

@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.joint.estimator import JointEstimator, JointForces
+from gelslim_force.joint.estimator import JointEstimator
+from gelslim_force.joint.fit_state import JointForces
 from gelslim_force.motion.marker_motion import MarkerRays
 
 Array = NDArray[np.float64]

@@ -28,6 +28,32 @@ class MarkerRows:
     residual: Array
     weight: Array
 
+    @classmethod
+    def of(
+        cls,
+        used: NDArray[np.intp],
+        rows: Any,
+        lateral_mm: Array,
+        motion: tuple[Array, Array, Array, Array],
+        errors: tuple[float, float, float],
+    ) -> MarkerRows:
+        """Residuals and weights, see `fit_kernel.marker_data`.
+
+        Args:
+            used: (m,) of n markers.
+            rows: (2m, 3p).
+            lateral_mm: (m, 2) motion that the picture shows.
+            motion: (n, 3) motion by the model, (n, 3) what cubic interpolation adds to it, (n, 2)
+                lateral motion that the picture shows per mm less of height, and (n,) deviation by
+                the noise.
+            errors: Deviation of all, share of the bending, and limit of the residuals.
+        """
+        from gelslim_force.joint.fit_kernel import marker_data
+
+        residual, weight = np.empty((2, 2 * len(used)))
+        marker_data(used, lateral_mm, *motion, errors, residual, weight)
+        return cls(used, rows, residual, weight)
+
     def after(self, step_n: Array) -> MarkerRows:
         """The same with the residuals that are left after a change (3p,) of the forces."""
         moved = self.rows @ step_n.astype(self.rows.dtype)

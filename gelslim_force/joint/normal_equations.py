@@ -1,4 +1,4 @@
-"""Least squares for contact forces: sums over the data, the prior, and the covariance.
+"""Least squares for contact forces: sums over linear data, the prior, and the covariance.
 
 The unknowns are changes x (3p,) of the forces on p nodes from a start f. Rows of data enter as
 r - A x with weights, and the gain of the light, which is one more unknown with a prior, is
@@ -12,7 +12,7 @@ vanishes with the step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,8 +21,10 @@ from scipy.linalg import cho_factor, cho_solve
 
 if TYPE_CHECKING:
     from gelslim_force.joint.light_sums import LightSums
+    from gelslim_force.joint.marker_rows import MarkerRows
 
 Array = NDArray[np.float64]
+Nodes = NDArray[np.intp]
 STEPS = 400
 TOLERANCE = 1e-4
 _MARGIN = 1.05
@@ -59,7 +61,7 @@ class NormalEquations:
             heights: (m, 3p) heights per force.
             gain: Expected change of the gain, and its standard deviation.
         """
-        from gelslim_force.joint.equations_kernel import add_light
+        from gelslim_force.joint.fit_kernel import add_light
 
         expected, sigma = gain
         own = light.by_gain + sigma**-2
@@ -96,7 +98,7 @@ class NormalEquations:
             normal_mpa: Standard deviation of the pressure.
             tangential_mpa: Standard deviation of the tangential traction.
         """
-        from gelslim_force.joint.equations_kernel import add_prior
+        from gelslim_force.joint.fit_kernel import add_prior
 
         hessian, slope = self.hessian.copy(), self.slope.copy()
         sizes = np.array([tangential_mpa, tangential_mpa, normal_mpa])
@@ -133,12 +135,82 @@ class NormalEquations:
         return np.asarray(self.spread_of(sums, force) @ sums.T)
 
 
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Data by the forces on p nodes.
+
+    Attributes:
+        nodes: (p,) those whose forces are sought.
+        start: (3p,) their forces to start from.
+        moved_mm: (c, 3) motion of the surface in the estimate.
+        offset_mm: (c, 3) by which it differs from that of a linear gel.
+        gain: Of the light in the estimate.
+        deepness: Of the contact in the estimate.
+        equations: Of the data, without a prior.
+        markers: Data of the markers.
+        light: Data of the light; None without light.
+        heights: (m, 3r) heights of the nodes of `light` per force on the r nodes of the estimate;
+            None without light.
+        step: (3r,) change of the forces from the estimate to the start; None for no change.
+        free: (3p,) numbers of the forces sought among those; None for all.
+    """
+
+    nodes: Nodes
+    start: Array
+    moved_mm: Array
+    offset_mm: Array
+    gain: float
+    deepness: float
+    equations: NormalEquations
+    markers: MarkerRows
+    light: LightSums | None
+    heights: Any
+    step: Array | None = None
+    free: Nodes | None = None
+
+    def heights_after(self, force: Array) -> Array | None:
+        """Change (m,) of the heights from the estimate to forces (3p,); None without light."""
+        if self.light is None:
+            return None
+        step = force - self.start
+        if self.step is not None:
+            whole = self.step.copy()
+            whole[self.free] = step
+            step = whole
+        return np.asarray(self.heights @ step.astype(self.heights.dtype), dtype=float)
+
+    def on(self, nodes: Nodes) -> Linearised:
+        """The same data where only some of the nodes (q,) may press; the others bear no force.
+
+        The data must be those of all nodes.
+        """
+        from gelslim_force.joint.fit_kernel import take_nodes
+
+        kept = np.flatnonzero(np.isin(self.nodes, nodes, assume_unique=True))
+        free = (3 * kept[:, None] + np.arange(3)).ravel()
+        step = -self.start
+        step[free] = 0.0
+        hessian, own = self.equations.hessian, np.empty((len(free), len(free)))
+        take_nodes(hessian[free], kept, own)
+        rows = np.empty((len(self.markers.rows), len(free)), dtype=self.markers.rows.dtype)
+        take_nodes(self.markers.rows, kept, rows)
+        return replace(
+            self,
+            nodes=nodes,
+            start=self.start[free],
+            equations=NormalEquations(own, (self.equations.slope + hessian @ step)[free]),
+            markers=replace(self.markers.after(step), rows=rows),
+            step=step,
+            free=free,
+        )
+
+
 def _banded_product(matrix: Any, right: Any) -> Any:
     """Product of a symmetric matrix (m, m) and (m, q) without most of what is zero.
 
     Heights of nodes that are far apart share no bin: only a band of the matrix is not zero.
     """
-    from gelslim_force.joint.equations_kernel import half_width
+    from gelslim_force.joint.fit_kernel import half_width
 
     size = len(matrix)
     width, found = half_width(matrix), np.empty_like(right)

@@ -26,6 +26,8 @@ LEAST_VALID = 0.2
 """Share of the 3 x 3 bins that must be valid."""
 _CLOSED, _OPENED = 4, 1
 """Steps by which gaps, such as dots, are closed, and by which specks are removed."""
+_LEAST_ACROSS = 0.1
+"""Sensitivity, or difference of those of two channels, that shows a slope across."""
 _GROWS_FAST = 0.1
 """Share of the nodes seen that are new in one frame and not next to those seen before."""
 _DENT, _LEAST_DENT = 0.25, 0.1
@@ -57,6 +59,20 @@ def contact_nodes(
     dent = _dent(lattice, places[seen], rise[seen])
     whole = filled(closed(lattice.picture(region) | dent, 1))
     return np.asarray(whole[lattice.place[:, 0], lattice.place[:, 1]])
+
+
+def rise_of(by_slope: Array, log_change: Array) -> Array | None:
+    """Change (rows, columns) that grows with a rise along y; None where no light tells it.
+
+    Args:
+        by_slope: (c,) loss of light of each channel per unit slope along y.
+        log_change: (c, rows, columns) of their light.
+    """
+    if len(by_slope) == 1:
+        falling, change = by_slope[0], log_change[0]
+    else:
+        falling, change = by_slope[0] - by_slope[1], log_change[0] - log_change[1]
+    return None if abs(falling) < _LEAST_ACROSS else np.asarray(-np.sign(falling) * change)
 
 
 def _continued(region: Mask, hidden: Mask, lattice: NodeLattice) -> Mask:

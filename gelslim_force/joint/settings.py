@@ -51,7 +51,9 @@ class JointSettings:
         deep_least_pressure: The same of a deep contact.
         light_reach: Steps along the lattice around the region whose light is used.
         marker_reach: The same for the markers.
-        rounds: Linearisations on the region seen, and then each time on the nodes that press.
+        rounds: Solutions on the region seen, and then each time on the nodes that press. Each has a
+            linearisation of its own, except for the first on fewer nodes of a contact that is not
+            deep, where the linear data of the last one still hold.
         following_rounds: The same on the nodes that pressed before and those next to them: after
             `rounds`, or instead of them where the frame before had this contact.
         deep_rounds: Most further linearisations of a deep contact, until the force changes by less

@@ -20,7 +20,8 @@ from gelslim_force.contact.normal_source import FoundForces, NormalReading
 from gelslim_force.contact.shading_change import LostColourError
 from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm, law_of
 from gelslim_force.frames.upright import upright
-from gelslim_force.joint.estimator import JointEstimator, JointForces
+from gelslim_force.joint.estimator import JointEstimator
+from gelslim_force.joint.fit_state import JointForces
 from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.light_view import LightView
 from gelslim_force.joint.marker_misfit import with_misfit

@@ -18,7 +18,7 @@ from sigma_cases import press, press_force_n, seen, specified_bundle
 from sigma_gate import COVERAGE, RMS, condition_of
 
 from gelslim_force.built_sensor import BuiltGel, built_gel
-from gelslim_force.joint.estimator import JointForces
+from gelslim_force.joint.fit_state import JointForces
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings
