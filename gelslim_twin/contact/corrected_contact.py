@@ -13,10 +13,10 @@ tolerance. The error is thus controlled along the path, without knowledge of the
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
-from math import inf
+from math import inf, isinf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,9 +46,14 @@ LAW_TOLERANCE, LAW_STEPS = 3e-2, 40
 LAW_SHARE, SOLVED_SHARE = 3.0, 1 / 3
 """The law's tolerance over that of a contact where that is less, and that of linear equations over
 the law's."""
-LEFT = 0.5
-"""What is left after a correction over what it has changed, at most: a second correction changes
-0.1 to 0.3 of what the first does in the scenes of the gallery."""
+CONTACT_SHARE = 2.0
+"""Root of the largest tolerance of the linear contact over that of a corrected one, since the error
+of displacements grows with the root: what a correction changes must not be the error before it."""
+LEFT, MOST_LEFT = 0.5, 9.0
+"""What is left after a correction over what it has changed where no rate is known, and at most: a
+second correction changes 0.05 to 0.3 of what the first does in the scenes of the gallery."""
+RATE_SAFETY, LEAST_RATE = 2.0, 0.05
+"""Factor on the rate at which corrections were last seen to become smaller, and its least value."""
 GROWTH = 3.0
 """Factor on what the next correction is expected to change: the two laws differ by the square of
 the displacement, so that the change per displacement grows along a path."""
@@ -168,6 +173,30 @@ class _LastCorrected:
         return GROWTH * self.per_mm * mm, GROWTH * self.per_n * n
 
 
+@dataclass(frozen=True, eq=False)
+class _Rates:
+    """Rates at which corrections of a pose become smaller, as they were last seen."""
+
+    of_mm: float = inf
+    of_n: float = inf
+    at_mm: float = inf
+    """Largest displacement when they were seen. The laws differ by the square of the displacement,
+    so that the rates grow with it."""
+
+    def left(self, mm: float, n: float, most_mm: float) -> tuple[float, float]:
+        """What is left after a correction that has changed the contact by `mm` and `n`."""
+        if isinf(self.at_mm):
+            return LEFT * mm, LEFT * n
+        grown = RATE_SAFETY * max(1.0, most_mm / self.at_mm)
+        return mm * _remainder(grown * self.of_mm), n * _remainder(grown * self.of_n)
+
+
+def _remainder(rate: float) -> float:
+    """Sum of the geometric series of later changes over the last one, at most `MOST_LEFT`."""
+    rate = max(LEAST_RATE, rate)
+    return min(MOST_LEFT, rate / (1 - rate)) if rate < 1 else MOST_LEFT
+
+
 @dataclass(eq=False)
 class CorrectedContact:
     """Solves the contact along a sequence of poses, like `ContactSolver`, on a neo-Hookean gel.
@@ -179,6 +208,9 @@ class CorrectedContact:
     solver: ContactSolver
     tolerance: float = 0.02
     """Error of displacements and of the resultant, over the largest so far."""
+    by_rate: bool = True
+    """Whether what a correction leaves follows from the rate at which they become smaller. For a
+    tool with walls it should not: which nodes a wall holds takes corrections to spare."""
 
     def __post_init__(self) -> None:
         """Raises ContactError for a pad to which the neo-Hookean law does not apply."""
@@ -186,6 +218,9 @@ class CorrectedContact:
         if problem is not None:
             raise ContactError("; ".join(problem))
         law = min(LAW_TOLERANCE, LAW_SHARE * self.tolerance)
+        settings = self.solver.settings
+        most = (CONTACT_SHARE * self.tolerance) ** 2
+        self.solver.settings = replace(settings, tolerance=min(settings.tolerance, most))
         self._correction = Correction(self.solver.compliance.bundle, law)
         self._none = np.zeros_like(self.solver.points_mm)
         self._restart()
@@ -219,6 +254,7 @@ class CorrectedContact:
     def _restart(self) -> None:
         """Start from a gel at rest, of which only is known that it needs a correction."""
         self._offset, self._last = self._none, _LastCorrected(GelState.at_rest(len(self._none)))
+        self._rates = _Rates()
 
     def _corrected(self, last: GelState, before: Pose | None, pose: Pose) -> GelState:
         start = now = last
@@ -230,19 +266,22 @@ class CorrectedContact:
             return GelState.at_rest(len(self._none))
         if self._is_within(*self._last.expected(now)):
             return now
-        uncorrected = now
-        for done in range(MOST_CORRECTIONS):
+        uncorrected, changes = now, list[tuple[float, float]]()
+        for _ in range(MOST_CORRECTIONS):
             self._offset = self._correction.offset_mm(now, self._offset)
             found = self.solver.step(start, came, pose, self._offset, now)
             mm, n = _apart(found, now)
-            if done == 0:
-                first_mm, first_n = mm, n
             now = found
             self._most_mm = max(self._most_mm, float(np.abs(now.displacement_mm).max()))
             self._most_n = max(self._most_n, float(np.linalg.norm(now.force_n.sum(axis=0))))
-            if self._is_within(LEFT * mm, LEFT * n):
-                by_mm, by_n = _apart(uncorrected, self._last.state)
-                self._last = _LastCorrected(now, _rate(first_mm, by_mm), _rate(first_n, by_n))
+            changes.append((mm, n))
+            if self.by_rate and len(changes) > 1:
+                by_mm, by_n = map(_rate, changes[-1], changes[-2])
+                self._rates = _Rates(by_mm, by_n, self._most_mm)
+            left = self._rates.left(mm, n, self._most_mm)
+            if self._is_within(*left):
+                moved = _apart(uncorrected, self._last.state)
+                self._last = _LastCorrected(now, *map(_rate, changes[0], moved))
                 return now
         raise ContactError(f"corrections still move the surface by {mm:.1e} mm")
 

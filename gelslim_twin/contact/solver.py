@@ -218,6 +218,9 @@ class ContactSolver:
         if met_mm is not None:
             met[:, 2] = met_mm
         below = self.tool.clearance_mm(pose, self.points_mm + met)
+        if met_mm is None and ahead.any() and not (below < 0).any():
+            # A tool that rises may meet nodes where they were before it pushed them aside.
+            below = np.minimum(below, self.tool.clearance_mm(pose, self.points_mm))
         on_tool = np.isfinite(below)
         depth = -float(np.min(below, initial=0.0))
         moved, guess = first.displacement_mm, first.force_n

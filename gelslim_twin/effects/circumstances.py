@@ -166,12 +166,14 @@ class PictureSizes:
     """What a probe finds in pictures, with its safety factor.
 
     Attributes:
-        sizes: By effect, the error of leaving it out.
         coarsest: By effect, the error of its coarsest rung.
+        together: By effect, its part of the error of leaving all these effects out at once.
+        pictures: Number of pictures that were drawn.
     """
 
-    sizes: Mapping[str, Bound]
-    coarsest: Mapping[str, Bound]
+    coarsest: Mapping[str, Bound] = field(default_factory=dict)
+    together: Mapping[str, Bound] = field(default_factory=dict)
+    pictures: int = 0
 
 
 @dataclass(frozen=True)
@@ -188,6 +190,8 @@ class Probed:
         coarsest: By effect, the error of its coarsest rung as found at a hard pose, times a safety
             factor; finer rungs err no more.
         dot_mm_s: Largest speed of a dot, times a safety factor; infinite where it was not probed.
+        together: By effect, its part of the error of leaving all these effects out at once. It
+            holds for all of them and for no part of them.
     """
 
     normal_n: float
@@ -197,6 +201,7 @@ class Probed:
     milliseconds: float = 0.0
     coarsest: Mapping[str, Bound] = field(default_factory=dict)
     dot_mm_s: float = math.inf
+    together: Mapping[str, Bound] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

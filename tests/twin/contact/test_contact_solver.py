@@ -127,6 +127,26 @@ def test_release_leaves_nothing() -> None:
         assert not state.touch.any()
 
 
+@pytest.mark.parametrize("angle_deg", [60.0, 100.0])
+def test_a_tip_that_rises_still_holds_the_node_that_it_pushed_aside(angle_deg: float) -> None:
+    """Without friction the path does not matter: the same as pressed to that depth at once.
+
+    The flank of the tip moves the only node that it meets sideways, from under the tip.
+    """
+    pad = SurfaceCompliance(small_pad(0.49, 12, 3, 12.0))
+    cone = Cone(shape="cone", included_angle_deg=angle_deg, tip_radius_mm=0, x_mm=0.05)
+    tool = Tool.of([cone], Path())
+
+    def force_n(*depths_mm: float) -> NDArray[np.float64]:
+        poses = tuple(Pose(time_s=float(k), depth_mm=d) for k, d in enumerate(depths_mm))
+        solver = ContactSolver(pad, tool, ContactSettings(1e-4))
+        return list(solver.states(poses))[-1].force_n.sum(axis=0)
+
+    at_once, raised = force_n(0.0, 0.2), force_n(0.0, 0.3, 0.6, 0.2)
+    assert at_once[2] < -1e-3
+    assert raised == pytest.approx(at_once, abs=1e-3 * abs(at_once[2]))
+
+
 def test_a_turn_without_a_press_does_nothing() -> None:
     states = walk(solver(PUNCH), Pose(), Pose(twist_deg=30), Pose(depth_mm=-0.1, twist_deg=60))
     assert not any(s.force_n.any() or s.displacement_mm.any() for s in states)

@@ -101,16 +101,17 @@ def test_poses_that_cannot_be_corrected_are_solved_to_converge(
     assert [s.solver.get("number") for s in found] == [None, 1.0, 2.0, 3.0]
 
 
+OTHERS = (2013, 2026, 2028, 2038, 2040, 2059, 2107, 2204, 3020, 3028)
 SLIDING_WALLS = (2014, 2017, 2019, 2021, 2027, 2029, 2041, 2042, 2044, 2045, 2053, 2060, 2083, 2089)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2013, 2026, 2028, 2038, 2040, 2059, 2204, *SLIDING_WALLS])
+@pytest.mark.parametrize("seed", [*OTHERS, *SLIDING_WALLS])
 def test_rungs_keep_their_error_along_random_paths(tmp_path: Path, seed: int) -> None:
     """Seeds at which walls hold other nodes at 2 %, deep ones, and gels of ν = 0.49.
 
     In 2027 Newton's method at 1e-2 and at 1e-3 differ by 0.7 % of the force. In 2089 a sliding wall
-    holds another node even at 0.5 %.
+    holds another node even at 0.5 %. In 2014 and 2107 it does with other numbers of corrections.
     """
     finger, values = random_contact(seed)
     for move in values["motion"]["waypoints"]:
@@ -126,7 +127,8 @@ def test_rungs_keep_their_error_along_random_paths(tmp_path: Path, seed: int) ->
     true = list(NonlinearContact(solver(), 1e-3).states(one.poses))
     for tolerance in (0.02, HELD_AT):
         assert tolerance in [t for t, _ in CORRECTED_RUNGS]
-        n, mm = apart(list(CorrectedContact(solver(), tolerance).states(one.poses)), true)
+        rung = CorrectedContact(solver(), tolerance, by_rate=not c.has_walls)
+        n, mm = apart(list(rung.states(one.poses)), true)
         allowed = corrected_error(c, tolerance)
         assert n <= allowed.force_n, tolerance
         assert mm * c.sensor.px_per_mm <= allowed.displacement_px, tolerance

@@ -33,7 +33,10 @@ TIMES_MS = {
     "friction": (0.4,),
     "sliding_friction": (0.1, 0.1, 0.1),
     "adhesion": (6.0,),
-    "nonlinearity": (8.0, 12.0, 18.0, 26.0, 34.0, 50.0, 64.0, 80.0, 250.0, 350.0, 450.0),
+    "nonlinearity": (
+        *(8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0, 26.0, 30.0, 36.0, 44.0, 60.0),
+        *(250.0, 350.0, 450.0),
+    ),
     "skin": (0.0,),
     "relaxation": (0.01 + 8e-5 * 1849,),
     "viscoelasticity": tuple(0.02 * n + 1.4 * (n - 1) for n in (1, 2, 4, 8, 16)),
@@ -170,7 +173,7 @@ def test_corrections_err_by_their_tolerance_and_more_where_walls_slide() -> None
     sliding = errors(MOTION, math.inf)
 
     def expected(t: float) -> Bound:
-        return geometry(2 * t * 1.25 * 0.4 * px, 0.75 * t * 1.25 * 2.0)
+        return geometry(2 * t * 1.25 * 0.4 * px, t * 1.25 * 2.0)
 
     for t in (0.005, 0.002):
         assert values(smooth[t]) == values(straight[t]) == pytest.approx(values(expected(t)))
@@ -183,6 +186,17 @@ def test_corrections_err_by_their_tolerance_and_more_where_walls_slide() -> None
     fine = expected(0.005).plus(geometry(2 * depth_px, 0.0)).at_most(whole[-1])
     assert values(sliding[0.005]) == pytest.approx(values(fine))
     assert sliding[0.002] == sliding[0.005]
+
+
+def test_corrections_of_tools_with_walls_stop_later() -> None:
+    times = []
+    for steepest in (0.5, math.inf):
+        tool = replace(ball(14.0), steepest=lambda _d, s=steepest: s)
+        c = circumstances(0.3, footprint=tool)
+        rungs = [r for r in LADDER["nonlinearity"](c) if "corrected_contact" in r.implementation]
+        assert {r.parameters["by_rate"] for r in rungs} == {math.isfinite(steepest)}
+        times.append([r.milliseconds for r in rungs])
+    assert times[1] == pytest.approx([1.5 * ms for ms in times[0]])
 
 
 def test_what_a_scene_switches_on_is_solved_until_it_converges() -> None:
