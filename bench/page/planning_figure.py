@@ -149,6 +149,8 @@ def _summary(what: str, rows: list[dict[str, Any]]) -> str:
     judged = [r for r in rows if r["needless"] is not None]
     kept, needless = (sum(r["kept"] for r in judged), sum(len(r["needless"]) for r in judged))
     spare = f"; {needless} of {kept} effects are kept without need" if judged else ""
+    if all("needless_at_once" in r for r in judged) and judged:
+        spare += f", {sum(r['needless_at_once'] for r in judged)} of which could go at once"
     ratios = sorted(ratio(r) for r in rows)
     probed = [r for r in rows if r["probed"]]
     share = median(r["planning_ms"] / r["whole_ms"] for r in probed) if probed else 0.0

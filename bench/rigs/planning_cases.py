@@ -189,7 +189,8 @@ def measured(
         case: The scene with its tolerance.
         level: Relative tolerance that was asked for, None for the scene's own.
         every: Everything on, carried out.
-        with_needless: Whether effects are left out one by one, which takes long at large strain.
+        with_needless: Whether effects are left out one by one, and then as many as possible of
+            those found needless at once, which takes long at large strain.
 
     Raises:
         ContactError: A contact is not solved.
@@ -203,13 +204,23 @@ def measured(
     if "image" in asked.observe:
         pair = (every.outcome, run.outcome, ("image",))
         doubtful = case.trial.differences(*pair, doubtful=True)["image"] / asked.image_px
-    kept, needless = optional(plan), []
+    kept = optional(plan)
+    needless, at_once = list[str](), plan
+
+    def is_kept(less: Plan, name: str) -> bool:
+        """Whether a plan without an effect keeps the tolerance."""
+        found = case.outcome(less)
+        if max(case.used(found, every.outcome).values()) > 1.0:
+            return False
+        apart_px = case.trial.light_apart_px if name == SHADING else None
+        return apart_px is None or apart_px(run.outcome, found) <= asked.image_px
+
     for name in kept if with_needless else ():
-        less = case.outcome(without(plan, name))
-        if max(case.used(less, every.outcome).values()) > 1.0:
-            continue
-        if name != SHADING or case.trial.light_apart_px(run.outcome, less) <= asked.image_px:
+        if is_kept(without(plan, name), name):
             needless.append(name)
+            # Several effects that are needless one by one may share what is left of the tolerance.
+            if len(needless) == 1 or is_kept(without(at_once, name), name):
+                at_once = without(at_once, name)
     return {
         "level": level,
         "observe": list(asked.observe),
@@ -228,4 +239,5 @@ def measured(
         "over": [o for o, _ in plan.over_tolerance],
         "kept": len(kept),
         "needless": needless if with_needless else None,
+        "needless_at_once": len(kept) - len(optional(at_once)) if with_needless else None,
     }

@@ -38,6 +38,8 @@ class Question:
     force_n: float
     image_px: float
     circumstances: Circumstances
+    left_out: frozenset[str] = frozenset()
+    """Effects that are left out together, each of which has its part of their common size."""
     _kept: dict[Effect, tuple[Bound, tuple[Rung, ...]]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -60,6 +62,15 @@ class Question:
         """`auto`, `on` or `off`."""
         return self.circumstances.parameters[effect.name].use
 
+    def with_together(self) -> Question | None:
+        """The question with the effects left out that a probe left out together, if any."""
+        found = self.circumstances.probed
+        if found is None or not found.together:
+            return None
+        one = replace(found, sizes={**found.sizes, **found.together}, together={})
+        here = replace(self.circumstances, probed=one)
+        return replace(self, circumstances=here, left_out=frozenset(found.together))
+
 
 def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
     """Decide for each effect whether it is simulated, and choose its cheapest sufficient rung.
@@ -70,9 +81,21 @@ def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
     the effects that save most time by it. Exceptions are effects that the scene switches off and
     effects whose best rung errs more; `Plan.over_tolerance` lists them.
 
+    Effects that a probe left out together are left out where that keeps the tolerance and takes no
+    longer than deciding about each of them.
+
     Raises:
         PlanError: The only provider of something needed is switched off.
     """
+    one_by_one, jointly = _plan(question, effects), question.with_together()
+    if jointly is None:
+        return one_by_one
+    together = _plan(jointly, effects)
+    over = {o for o, _ in together.over_tolerance} - {o for o, _ in one_by_one.over_tolerance}
+    return one_by_one if over or together.predicted_ms > one_by_one.predicted_ms else together
+
+
+def _plan(question: Question, effects: Sequence[Effect]) -> Plan:
     decided: dict[str, Choice] = {}
     needed = frozenset(question.observe)
     while True:
@@ -131,11 +154,16 @@ def _provider(question: Question, effects: Sequence[Effect], datum: str) -> Effe
 
 
 def _shares(question: Question, relevant: Sequence[Effect]) -> dict[str, float]:
-    """Per observable, the tolerance over the number of effects that can use up some of it."""
+    """Per observable, the tolerance over the number of effects that can use up some of it.
+
+    What effects that are left out together cost is taken off before.
+    """
+    lost = [question.weighed(e)[0] for e in relevant if e.name in question.left_out]
+    others = [e for e in relevant if e.name not in question.left_out]
     return {
-        observable: question.tolerance(observable)
-        / max(1, sum(_may_cost(question, e, observable) for e in relevant))
-        for observable in question.observe
+        o: max(0.0, question.tolerance(o) - sum(size.of(o) for size in lost))
+        / max(1, sum(_may_cost(question, e, o) for e in others))
+        for o in question.observe
     }
 
 
@@ -167,6 +195,9 @@ def _decide(question: Question, effect: Effect, relevant: bool, shares: dict[str
         return _choice(question, effect, f"provides {made}", shares, ladder)
     if effect.is_null(c, size):
         return _choice(question, effect, "parameters nil", shares)
+    if effect.name in question.left_out:
+        own = {o: size.of(o) for o in shares}
+        return _choice(question, effect, "small with others", own)
     if all(size.of(observable) <= share for observable, share in shares.items()):
         return _choice(question, effect, "below its share", shares)
     worst = max(shares, key=lambda o: _excess(size.of(o), shares[o]))

@@ -29,13 +29,19 @@ NOISE = "sensor_noise"
 SHADING = "shading"
 PICTURED = (SHADING, "defocus", NOISE, "exposure", "specular", "dirt")
 """Effects of the picture that a probe draws: they change grey values, and a picture is evaluated by
-its dots. Of shading it finds the error of its coarsest rung and not the size, because the light is
-read from the picture too."""
+its dots. Of shading it finds the change of the light too, because that is read from a picture."""
 FIND_MS = 8.0
 """Time of finding the dots of a picture of 640 x 480 pixels."""
+FLOOR_PX = 0.01
+"""What is added to the shift of dots between pictures: as much as a change of a few pixels by one
+grey value may move a dot."""
+LEAST_PICTURES = 2
+"""Pictures that show what effects do together: one with all of them and one without any."""
 MOST_SHARE = 0.05
 """Largest time of a probe over that of the run with large strain solved to convergence, both as
 declared."""
+PAYING_SHARE = 0.1
+"""Time of the pictures of a probe over what they may save, up to which any run has them drawn."""
 USUAL_STRAIN = 0.5
 """Share of the declared time of large strain that counts for the pictures of a probe: small
 contacts converge faster."""
@@ -74,19 +80,32 @@ def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
 
 
 def _pictured(question: Question, plan: Plan, solved: tuple[str, ...]) -> tuple[str, ...]:
-    """The effects that a probe draws, the slowest first, within its share of the run."""
-    most_ms = MOST_SHARE * _run_ms(question, plan, USUAL_STRAIN) - probe_ms(question, plan, solved)
-    wanted = [
-        c
+    """The effects that a probe draws; none where its pictures do not pay."""
+    found = effects_to_draw(question, plan)
+    return found if most_pictures(question, plan, solved) >= LEAST_PICTURES else ()
+
+
+def effects_to_draw(question: Question, plan: Plan) -> tuple[str, ...]:
+    """The effects on grey values that a plan includes and may leave out."""
+    return tuple(
+        c.effect
         for c in plan.included
         if c.effect in PICTURED and question.circumstances.parameters[c.effect].use == "auto"
-        if c.effect != SHADING or c.rung != coarsest_shading(question.circumstances).name
-    ]
-    found: tuple[str, ...] = ()
-    for choice in sorted(wanted, key=lambda c: -c.predicted_ms):
-        if _pictures_ms(question, plan, (*found, choice.effect)) <= most_ms:
-            found = (*found, choice.effect)
-    return found
+    )
+
+
+def most_pictures(question: Question, plan: Plan, solved: Sequence[str]) -> int:
+    """Number of pictures that a probe may draw, after it has solved the size of effects.
+
+    They take no more than their share of the run, or a small part of what they may save.
+    """
+    if question.image_px <= 2 * FLOOR_PX:
+        return 0
+    names = effects_to_draw(question, plan)
+    saved_ms = plan.poses * sum(c.predicted_ms for c in plan.included if c.effect in names)
+    left_ms = MOST_SHARE * _run_ms(question, plan, USUAL_STRAIN) - probe_ms(question, plan, solved)
+    most_ms = min(max(left_ms, PAYING_SHARE * saved_ms), saved_ms)
+    return max(0, math.floor(most_ms / picture_ms(question, plan)))
 
 
 def _run_ms(question: Question, plan: Plan, strained: float) -> float:
@@ -113,21 +132,16 @@ def probe_ms(question: Question, plan: Plan, effects: Sequence[str]) -> float:
     # A correction of the hardest pose, or of two; setting up the law takes as long as one.
     laws = 0 if "nonlinearity" not in effects else 2 if straight else 3
     solving_ms = poses * paths * linear_ms + laws * correction_ms(question.circumstances)
-    return solving_ms + _pictures_ms(question, plan, effects)
+    drawn = any(name in PICTURED for name in effects)
+    return solving_ms + (LEAST_PICTURES * picture_ms(question, plan) if drawn else 0.0)
 
 
-def _pictures_ms(question: Question, plan: Plan, effects: Sequence[str]) -> float:
-    """Declared time of the pictures of a probe, one more than effects, and of their dots."""
-    drawn = [name for name in effects if name in PICTURED]
-    if not drawn:
-        return 0.0
-    each_ms = sum(c.predicted_ms for c in plan.included if _is_seen(c) and c.effect != SHADING)
-    each_ms += FIND_MS * question.circumstances.sensor.frame_px / 307200
-    if SHADING not in plan.order:
-        return (len(drawn) + 1) * each_ms
-    rungs = shading_ladder(question.circumstances)
-    finer_ms = rungs[-1].milliseconds - rungs[0].milliseconds if SHADING in drawn else 0.0
-    return (len(drawn) + 1) * (each_ms + rungs[0].milliseconds) + finer_ms
+def picture_ms(question: Question, plan: Plan) -> float:
+    """Declared time of a picture of a probe and of finding its dots."""
+    seen_ms = sum(c.predicted_ms for c in plan.included if _is_seen(c) and c.effect != SHADING)
+    if SHADING in plan.order:
+        seen_ms += coarsest_shading(question.circumstances).milliseconds
+    return seen_ms + FIND_MS * question.circumstances.sensor.frame_px / 307200
 
 
 def coarsest_shading(circumstances: Circumstances) -> Rung:

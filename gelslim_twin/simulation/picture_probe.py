@@ -1,16 +1,18 @@
-"""The probe of the picture: one pose drawn with and without each effect on its grey values.
+"""The probe of the picture: one pose drawn with and without effects on its grey values.
 
-A picture is evaluated by its dots, so that the size of an effect is the largest shift of a dot that
-the force pipeline's detector finds, times a safety factor. Where more than a few dots are found in
-one of the two pictures only, the effect decides more than a shift, and the bound stays.
+A picture is evaluated by its dots, so that the size of effects is the largest shift of a dot that
+the force pipeline's detector finds, times a safety factor. All of them are left out at once, since
+two pictures then do for all. Where that shift is too large, the quickest effects are kept, and the
+others are left out. Where more than a few dots are found in one of two pictures only, the effects
+decide more than a shift, and their bounds stay.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,22 +22,33 @@ from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.circumstances import PictureSizes
-from gelslim_twin.effects.dot_positions import RARE
 from gelslim_twin.effects.effect import Bound, picture, rounded_up
 from gelslim_twin.effects.grey_values import PIXEL_STEPS
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.planning.probing import NOISE, SHADING
+from gelslim_twin.planning.probing import FLOOR_PX, NOISE, SHADING
 
 if TYPE_CHECKING:
     from gelslim_twin.render.frame_renderer import RenderedFrame
     from gelslim_twin.simulation.picture import Viewer
 
-SAFETY, FLOOR_PX = 3.0, 0.01
-"""Factor on the largest shift of a dot at the pose that is drawn, for the other poses, and what is
-added to it. In 17 random scenes 2.7 was needed, or 2.3 with this addition, which a change of a few
-pixels by one grey value may make."""
+SAFETY = 3.0
+"""Factor on the largest shift of a dot at the pose that is drawn, for the other poses and for the
+noise of other frames. In 17 random scenes 2.7 was needed, or 2.3 with the addition of `FLOOR_PX`;
+the largest shift by noise of many frames is up to 2 times that of one."""
 PICTURE_DIGITS = 2
 """Significant digits of what is found: one pixel that is rounded otherwise moves a dot."""
+LIGHT_SAFETY, LIT = 2.0, 0.05
+"""Factor on the change of the light at the pose that is drawn, and the share of the usual light
+below which a pixel does not count."""
+SURELY, LEAST_PX = 5.0, 0.2
+"""Ratio of the bound of shading to the least size that it may have, and that size in any scene:
+with a tighter tolerance its light is not computed, since its rung is what saves time."""
+KEPT_AT_ONCE = 2
+"""Effects that are kept more where all were too much."""
+FINE_STEP, FINE_PICTURES = 2, 2
+"""Pixels from one value to the next of the fine rung of shading that a probe draws, a quarter of
+the coarsest, and the pictures that one with it counts for. Beside the safety factor, what the
+finest rung would change is little."""
 LOST_SHARE = 5e-3
 """Share of the dots that may be found in one of two pictures only, as behind spots."""
 MATCH_PX = 3.0
@@ -47,66 +60,153 @@ no motion."""
 
 @dataclass(frozen=True, eq=False)
 class PictureProbe:
-    """Draws a pose with the effects of a plan, and without one of them.
+    """Draws a pose with the effects of a plan, and without some of them.
 
     Attributes:
         plan: The plan by bounds.
         viewer: How the sensor is seen by a plan.
-        frames: Number of frames of the run.
+        edge_shift_px: Shift of a dot's edge that changes the light as much as a share of it, by
+            which the light of shading is judged.
     """
 
     plan: Plan
     viewer: Callable[[Plan], Viewer]
-    frames: int
+    edge_shift_px: Callable[[float], float]
+    _kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+    """Pictures by state and effects."""
+    _kept_as: dict[Any, int] = field(default_factory=dict, init=False, repr=False)
+    """How many pictures each counts for."""
 
-    def found(self, state: GelState, effects: Iterable[str]) -> PictureSizes:
-        """What a state shows of effects, all but those whose dots are not found in both."""
-        dots = _Dots.of(self._drawn(state, self._coarse, NOT_DRAWN))
-        if dots is None:
-            return PictureSizes({}, {})
-        sizes, coarsest = dict[str, Bound](), dict[str, Bound]()
-        for name in effects:
-            if name == SHADING:
-                px = dots.shift_px(self._drawn(state, self._shaded(PIXEL_STEPS[-1]), NOT_DRAWN))
-                if px is not None:
-                    coarsest[name] = _with_safety(px)
-                continue
-            other = NOT_DRAWN - {name} if name == NOISE else NOT_DRAWN | {name}
-            px = dots.shift_px(self._drawn(state, self._coarse, other))
-            if px is not None:
-                px *= self._rare(dots.count) if name == NOISE else 1.0
-                sizes[name] = _with_safety(px)
-        return PictureSizes(sizes, coarsest)
+    def together(
+        self,
+        state: GelState,
+        effects: Sequence[str],
+        most_pictures: int,
+        leaves_out: Callable[[PictureSizes], frozenset[str]],
+    ) -> PictureSizes:
+        """What a state shows of leaving out as many of the effects at once as a plan allows.
+
+        Args:
+            state: The pose that is drawn.
+            effects: The effects that may be left out.
+            most_pictures: How many pictures may be drawn.
+            leaves_out: The effects that a plan leaves out which knows these sizes.
+
+        Returns:
+            The effects to leave out together, and what else was found on the way.
+        """
+        found, light_px = PictureSizes(), 0.0
+        names = [name for name in effects if name != SHADING]
+        if SHADING in effects:
+            # The rung of shading saves most of the time, so that it comes first.
+            if self._is_fine and self._may_draw(1 + FINE_PICTURES, most_pictures):
+                found = replace(found, coarsest=self._coarsest(state, names))
+            least_px = max(LEAST_PX, self.plan.choice(SHADING).size.image_px / SURELY)
+            promising = _jointly(found, least_px, [SHADING])
+            if SHADING in leaves_out(promising) and self._may_draw(3, most_pictures):
+                light_px = self._light_px(state)
+                if SHADING in leaves_out(_jointly(found, light_px, [SHADING])):
+                    names = [*effects]
+        # The quickest effects are kept first, since they cost least.
+        names.sort(key=lambda name: self.plan.choice(name).predicted_ms)
+        while names and self._may_draw(1 if self.pictures > 1 else 2, most_pictures):
+            px = self.size_px(state, names, light_px)
+            joint = found if px is None else _jointly(found, px, names)
+            if joint.together and {*names} <= leaves_out(joint):
+                return replace(joint, pictures=self.pictures)
+            names = names[KEPT_AT_ONCE:]
+        return replace(found, pictures=self.pictures)
 
     @property
+    def _is_fine(self) -> bool:
+        """Whether the plan has shading by a finer rung than the coarsest."""
+        rungs = {plan.choice(SHADING).rung_parameters for plan in (self.plan, self._coarse)}
+        return len(rungs) > 1
+
+    def size_px(
+        self, state: GelState, effects: Sequence[str], least_px: float = 0.0
+    ) -> float | None:
+        """The error of leaving effects out at once, with its safety factor; None for lost dots.
+
+        It is at least `least_px` where shading is among them.
+        """
+        with_all = NOT_DRAWN - {NOISE} if NOISE in effects else NOT_DRAWN
+        dots = _Dots.of(self._drawn(state, with_all))
+        px = None if dots is None else dots.shift_px(self._drawn(state, NOT_DRAWN | {*effects}))
+        if px is None:
+            return None
+        return max(_with_safety(px).image_px, least_px if SHADING in effects else 0.0)
+
+    @property
+    def pictures(self) -> int:
+        """Number of pictures that were drawn, or of those that take as long."""
+        return sum(self._kept_as.values())
+
+    def _may_draw(self, more: int, most: int) -> bool:
+        return self.pictures + more <= most
+
+    def _coarsest(self, state: GelState, names: Sequence[str]) -> dict[str, Bound]:
+        """The error of the coarsest rung of shading, against a fine one."""
+        without = NOT_DRAWN - {NOISE} if NOISE in names else NOT_DRAWN
+        dots = _Dots.of(self._drawn(state, without))
+        px = None if dots is None else dots.shift_px(self._drawn(state, without, self._fine))
+        return {} if px is None else {SHADING: _with_safety(px)}
+
+    def _light_px(self, state: GelState) -> float:
+        """The largest change of the light by shading, as the shift of a dot's edge."""
+        sums = []
+        for without in (NOT_DRAWN, NOT_DRAWN | {SHADING}):
+            viewer = self._viewer(without, self._fine)
+            camera = viewer.renderer.camera
+            bare = np.zeros((camera.image_height_px, camera.image_width_px), np.float32)
+            sums.append(viewer.renderer.values(bare, viewer.surface(state)).sum(axis=2))
+        lit = sums[0] > LIT * np.median(sums[0])
+        share = float((np.abs(sums[1] - sums[0])[lit] / sums[0][lit]).max(initial=0.0))
+        self._kept_as["light"] = 1
+        return rounded_up(LIGHT_SAFETY * self.edge_shift_px(share), PICTURE_DIGITS)
+
+    @cached_property
     def _coarse(self) -> Plan:
         """The plan with the coarsest rung of shading, with which all but that is drawn."""
-        return self._shaded(PIXEL_STEPS[0])
+        return _with_step(self.plan, PIXEL_STEPS[0])
 
-    def _shaded(self, pixel_step: int) -> Plan:
-        step = (("pixel_step", pixel_step),)
-        choices = tuple(
-            replace(c, rung_parameters=step) if c.effect == SHADING and c.included else c
-            for c in self.plan.choices
-        )
-        return replace(self.plan, choices=choices)
+    @cached_property
+    def _fine(self) -> Plan:
+        """The plan with a fine rung of shading, by which the light and that are judged."""
+        return _with_step(self.plan, FINE_STEP)
 
-    def _rare(self, dots: int) -> float:
-        """The largest of all dots and frames over the largest of the dots of one frame.
-
-        Of n random shifts (Rayleigh's distribution) the largest is about sigma sqrt(2 ln n), and
-        none is above sigma sqrt(2 ln(n/p)) but for a share p of the runs.
-        """
-        most = math.log(max(dots, 2) * max(self.frames, 1) / RARE)
-        return math.sqrt(most / math.log(max(dots, 2)))
-
-    def _drawn(self, state: GelState, plan: Plan, without: frozenset[str]) -> RenderedFrame:
+    def _viewer(self, without: frozenset[str], plan: Plan) -> Viewer:
         kept = tuple(name for name in plan.order if name not in without)
-        return self.viewer(replace(plan, order=kept)).frame(state, None, 0, 0.0)
+        return self.viewer(replace(plan, order=kept))
+
+    def _drawn(
+        self, state: GelState, without: frozenset[str], plan: Plan | None = None
+    ) -> RenderedFrame:
+        viewer = self._viewer(without, plan or self._coarse)
+        key = (id(state), plan is None, viewer.plan.order)
+        if key not in self._kept:
+            self._kept[key] = viewer.frame(state, None, 0, 0.0)
+            self._kept_as[key] = 1 if plan is None else FINE_PICTURES
+        found: RenderedFrame = self._kept[key]
+        return found
+
+
+def _with_step(plan: Plan, pixel_step: int) -> Plan:
+    step = (("pixel_step", pixel_step),)
+    choices = tuple(
+        replace(c, rung_parameters=step) if c.effect == SHADING and c.included else c
+        for c in plan.choices
+    )
+    return replace(plan, choices=choices)
 
 
 def _with_safety(px: float) -> Bound:
     return picture(rounded_up(SAFETY * px + FLOOR_PX, PICTURE_DIGITS))
+
+
+def _jointly(known: PictureSizes, whole_px: float, names: Sequence[str]) -> PictureSizes:
+    """What is known with the common size of effects, in equal parts."""
+    return replace(known, together={name: picture(whole_px / len(names)) for name in names})
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ from gelslim_twin.contact.prony import PronySeries
 from gelslim_twin.contact.relaxation import at_rest, relax
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
-from gelslim_twin.effects.circumstances import MotionFigures, PictureSizes, Probed
+from gelslim_twin.effects.circumstances import MotionFigures, Probed
 from gelslim_twin.effects.contact import RIM_NODES, RIM_PLACES, RelaxationParameters
 from gelslim_twin.effects.effect import Bound, geometry, picture, rounded_up
 from gelslim_twin.effects.grey_values import MotionBlurParameters
@@ -42,6 +42,8 @@ from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.markers.interpolation import marker_to_node
 from ifem_export.operators.single_thread import single_threaded
 
+Pictured = Callable[[Question, GelState], Question]
+"""The question with what the picture of a state shows."""
 TOLERANCE = 1e-2
 """Of the contact: its error is a small part of the safety factors."""
 FORCE_SAFETY, FRICTION_SAFETY, PLACES_SAFETY = 1.25, 2.0, 2.0
@@ -60,7 +62,7 @@ def probed(
     compliance: SurfaceCompliance,
     effects: Sequence[str] = (),
     milliseconds: float = 0.0,
-    pictured: Callable[[GelState], PictureSizes] | None = None,
+    pictured: Pictured | None = None,
 ) -> Question:
     """The question with the force of the scene, and the sizes of `effects`, solved.
 
@@ -70,7 +72,7 @@ def probed(
         compliance: Compliance of the pad, which keeps the columns that it computes.
         effects: Which of `probing.PROBED` to size.
         milliseconds: Declared time of the probe.
-        pictured: What the picture of a state shows of effects on its grey values.
+        pictured: Adds what the picture of the hardest pose shows of effects on its grey values.
 
     Returns:
         The question, unchanged where the contact of a pose is not solved. An effect whose size is
@@ -80,17 +82,18 @@ def probed(
     probe = _Probe(asked, compliance, tool)
     if not probe.touches(loaded.poses):
         # Nodes, not areas, meet the tool: it passes between them or beside the pad.
-        seen = _seen(pictured, GelState.at_rest(len(probe.points_mm)))
         here = asked.circumstances
-        none = Probed(0.0, 0.0, 0.0, seen.sizes, milliseconds, seen.coarsest)
+        none = Probed(0.0, 0.0, 0.0, {}, milliseconds)
         apart = replace(here, motion=MotionFigures(here.motion.poses), probed=none)
-        return replace(asked, circumstances=apart)
+        known = replace(asked, circumstances=apart)
+        return (
+            known if pictured is None else pictured(known, GelState.at_rest(len(probe.points_mm)))
+        )
     try:
         steps = probe.steps(loaded, MOTION_BLUR in effects)
     except ContactError:
         return asked
-    seen = _seen(pictured, _hardest(steps)[0].state)
-    sizes = {**seen.sizes}
+    sizes = dict[str, Bound]()
     if "friction" in effects and (free := probe.frictionless(steps)):
         held = [step.state for step in steps]
         sizes["friction"] = probe.largest(held, free, FRICTION_SAFETY)
@@ -113,16 +116,12 @@ def probed(
         rounded_up(max(float(np.abs(step.state.displacement_mm).max()) for step in steps)),
         sizes,
         milliseconds,
-        seen.coarsest,
-        dot_mm_s,
+        dot_mm_s=dot_mm_s,
     )
     if found.normal_n <= 0:
         return asked
-    return replace(asked, circumstances=replace(asked.circumstances, probed=found))
-
-
-def _seen(pictured: Callable[[GelState], PictureSizes] | None, state: GelState) -> PictureSizes:
-    return PictureSizes({}, {}) if pictured is None else pictured(state)
+    known = replace(asked, circumstances=replace(asked.circumstances, probed=found))
+    return known if pictured is None else pictured(known, _hardest(steps)[0].state)
 
 
 @dataclass(frozen=True, eq=False)

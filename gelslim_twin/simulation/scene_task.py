@@ -235,10 +235,11 @@ def planned(
 
     pad = compliance()
     assert isinstance(pad, SurfaceCompliance), "a probe takes a table of columns"
+    solved = tuple(name for name in effects if name not in PICTURED)
     pictured = None
-    if viewer is not None and (seen := [name for name in effects if name in PICTURED]):
-        from gelslim_twin.simulation.picture_probe import PictureProbe
+    if viewer is not None and solved != effects:
+        from gelslim_twin.simulation.drawn_effects import drawn_effects
 
-        pictured = partial(PictureProbe(plan, viewer, plan.poses).found, effects=seen)
-    spent_ms = probe_ms(asked, plan, effects)
-    return plan_asked(loaded, probed(asked, loaded, pad, effects, spent_ms, pictured))
+        pictured = partial(drawn_effects, viewer=viewer, by_bounds=plan, solved=solved)
+    spent_ms = probe_ms(asked, plan, solved)
+    return plan_asked(loaded, probed(asked, loaded, pad, solved, spent_ms, pictured))

@@ -12,7 +12,12 @@ import pytest
 from scene_samples import GALLERY, MINIMAL, ROOT, SENSOR, load, plan_text, random_scene
 
 from gelslim_core.yaml.errors import InputError
-from gelslim_twin.effects.circumstances import Circumstances, EffectParameters, MotionFigures
+from gelslim_twin.effects.circumstances import (
+    Circumstances,
+    EffectParameters,
+    MotionFigures,
+    Probed,
+)
 from gelslim_twin.effects.contact_estimate import Footprint
 from gelslim_twin.effects.effect import GIVEN, OBSERVABLES, Bound, Effect, Rung, picture
 from gelslim_twin.effects.registry import EFFECTS
@@ -387,3 +392,28 @@ def test_the_budgets_choice_of_rungs_is_the_cheapest_within_the_shares() -> None
             assert worst(found, shares) == min(worst(r, shares) for r in ladder)
     assert kept > 50
     assert missed > 50
+
+
+def test_effects_found_small_together_are_left_out_together_or_not_at_all(tmp_path):
+    """Their common size holds for all of them and not for some."""
+    text = observing("image") + "tolerance: {image_px: 1.0}\neffects: {exposure: {gain: 1.4}}\n"
+    asked = question(load(tmp_path, text), SENSOR)
+    bounded = make_plan(asked)
+    names = ("shading", "defocus", "exposure", "sensor_noise")
+    assert {*names} <= {*bounded.order}
+
+    def planned_with(whole_px: float) -> Plan:
+        parts = {name: picture(whole_px / len(names)) for name in names}
+        found = Probed(0.2, 0.2, 0.2, {}, together=parts)
+        here = replace(asked.circumstances, probed=found)
+        return make_plan(replace(asked, circumstances=here))
+
+    small, large = planned_with(0.3), planned_with(1.1)
+    assert not {*names} & {*small.order}
+    assert {small.choice(name).why for name in names} == {"small with others"}
+    assert sum(small.choice(name).error.image_px for name in names) == pytest.approx(0.3)
+    assert 0.3 <= small.error("image") <= 1.0
+    assert not small.over_tolerance
+    assert small.predicted_ms < bounded.predicted_ms
+    assert {*names} <= {*large.order}
+    assert not large.over_tolerance

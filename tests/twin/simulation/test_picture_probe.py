@@ -13,7 +13,9 @@ from random_contact_scenes import random_contact
 from scene_samples import GALLERY, SENSOR
 
 from gelslim_twin.contact.gel_state import ContactError
+from gelslim_twin.effects.circumstances import PictureSizes
 from gelslim_twin.effects.contact import convergence_ms
+from gelslim_twin.effects.dot_contrast import shift_px
 from gelslim_twin.effects.effect import OBSERVABLES, rounded_up
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import make_plan
@@ -54,8 +56,9 @@ def sized(one: Trial, run: Outcome, effects: tuple[str, ...]) -> dict[str, float
     """Sizes in px by a probe of the pose with the largest force."""
     hardest = max(run.states, key=lambda s: float(np.linalg.norm(s.force_n.sum(axis=0))))
     viewer = partial(viewer_of, one.loaded, one.sensor)
-    found = PictureProbe(run.plan, viewer, len(run.states)).found(hardest, effects)
-    return {name: bound.image_px for name, bound in found.sizes.items()}
+    drawn = PictureProbe(run.plan, viewer, partial(shift_px, one.asked.circumstances))
+    found = {name: drawn.size_px(hardest, (name,)) for name in effects}
+    return {name: px for name, px in found.items() if px is not None}
 
 
 def shifts_px(one: Trial, run: Outcome, effect: str, frames: set[int]) -> float:
@@ -89,6 +92,45 @@ def test_sizes_of_grey_values_hold_at_other_poses(one: Trial) -> None:
     assert sizes["exposure"] < 0.1 * one.bound("exposure").image_px
     for effect, size in sizes.items():
         assert 0 < shifts_px(one, run, effect, {1, 3}) <= size, effect
+
+
+def test_effects_are_left_out_together_and_fewer_where_that_is_too_much(
+    one: Trial,
+) -> None:
+    """The light, a picture with all, one of fine shading (counts twice), one without."""
+    run = at_small_strain(one)
+    hardest = max(run.states, key=lambda s: float(np.linalg.norm(s.force_n.sum(axis=0))))
+    effects = tuple(name for name in PICTURED if name in run.plan.order)
+    assert len(effects) >= 5
+    assert SHADING in effects
+
+    def drawn(most: int, allowed_px: float) -> PictureSizes:
+        viewer = partial(viewer_of, one.loaded, one.sensor)
+        probe = PictureProbe(run.plan, viewer, partial(shift_px, one.asked.circumstances))
+
+        def leaves_out(sizes: PictureSizes) -> frozenset[str]:
+            whole = sum(bound.image_px for bound in sizes.together.values())
+            return frozenset(sizes.together if whole <= allowed_px else ())
+
+        return probe.together(hardest, effects, most, leaves_out)
+
+    every = drawn(9, 1000.0)
+    assert (set(every.together), every.pictures) == (set(effects), 5)
+    whole_px = sum(bound.image_px for bound in every.together.values())
+    still = without(run.plan, "motion_blur")
+    bare = one.carried_out(without(still, *effects), (hardest,))
+    seen = one.carried_out(still, (hardest,))
+    # The detector's own differences, and the light, found by the tests' own measure.
+    light_px = one.light_apart_px(seen, one.carried_out(without(still, SHADING), (hardest,)))
+    assert whole_px >= max(2.9 * seen_apart_px(seen, bare, {0}), 1.5 * light_px)
+    # Less is left out where all is too much, and nothing more is drawn than is allowed.
+    fewer = drawn(9, 0.6 * whole_px)
+    assert set(fewer.together) < set(effects)
+    assert sum(bound.image_px for bound in fewer.together.values()) <= 0.6 * whole_px
+    assert 5 < fewer.pictures <= 9
+    none = drawn(1, 1000.0)
+    assert not none.together
+    assert none.pictures <= 1
 
 
 @pytest.mark.slow
