@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
+from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
@@ -73,11 +74,11 @@ class JointEstimator:
         settings: What is assumed.
         moved: Finds the region where there is no light.
         off_design: What gel and camera that are not as specified do where there is no light.
-        strained: Another law of the gel, from motion (c, 3) to forces (c, 3), and None for the
-            linear one.
+        strained: Another law of the gel, from motion (c, 3) to forces (c, 3); None for linear.
         strained_from_mm: Depth from which it is used.
         relief: What the heights of a deep dent do to its light; None without directions of light.
         deep_mm: Depth from which a contact is deep.
+        finer: The surface between the nodes, as the light sees it; None for cubic convolution.
     """
 
     points_mm: Array
@@ -100,6 +101,7 @@ class JointEstimator:
     strained_from_mm: float = 0.0
     relief: NodeRelief | None = None
     deep_mm: float = math.inf
+    finer: FinerSurface | None = None
 
     def estimate(
         self,
@@ -299,7 +301,8 @@ class JointEstimator:
             return None
         wide = self.lattice.widened(near, self.settings.light_reach)
         relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
-        bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide, relief)
+        finer = None if self.finer is None else self.finer.seen(near, moved_mm, state.force_n)
+        bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide, relief, finer)
         chosen = settings_at(self.settings, self._deepness(state))
         error = math.hypot(chosen.light_error, chosen.light_share * rms_length(bins.change.T))
         return bins.sums(self.law, moved_mm[:, 2], state.gain, error)
@@ -342,7 +345,6 @@ class JointEstimator:
         )
 
     def _shown(self, seen: SeenLight | None) -> Mask:
-        count = len(self.points_mm)
         if self.light is None or seen is None:
-            return np.zeros(count, dtype=bool)
-        return self.light.shown(seen, count)
+            return np.zeros(len(self.points_mm), dtype=bool)
+        return self.light.shown(seen, len(self.points_mm))

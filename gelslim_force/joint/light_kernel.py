@@ -297,3 +297,28 @@ def gather_markers(values: Any, markers: Any, nodes: Any, by_height: Any, found:
             for axis in range(3):
                 found[2 * k, 3 * n + axis] = along[axis] - lean_x * height[axis]
                 found[2 * k + 1, 3 * n + axis] = across[axis] - lean_y * height[axis]
+
+
+@njit(**COMPILED)
+def add_stencils(stencil: Any, places: Any, force: Any, number: Any, found: Any) -> None:
+    """Add the heights that forces (p, 3) at places (p, 2) of a lattice make around them.
+
+    Args:
+        stencil: (2r + 1, 2r + 1, 3) height by the force along each axis, by the distance.
+        places: (p, 2).
+        force: (p, 3).
+        number: (nx, ny) entry of `found` of each place; -1 where there is none.
+        found: (f,), to which the heights are added.
+    """
+    reach = stencil.shape[0] // 2
+    for n in range(len(places)):
+        row, column = places[n, 0] - reach, places[n, 1] - reach
+        for a in range(max(-row, 0), min(stencil.shape[0], number.shape[0] - row)):
+            for b in range(max(-column, 0), min(stencil.shape[1], number.shape[1] - column)):
+                place = number[row + a, column + b]
+                if place >= 0:
+                    found[place] += (
+                        stencil[a, b, 0] * force[n, 0]
+                        + stencil[a, b, 1] * force[n, 1]
+                        + stencil[a, b, 2] * force[n, 2]
+                    )

@@ -85,6 +85,8 @@ class PlacedBins:
         built: Gain of the light as calibrated, (c, n) or one number.
         independent: Share of the noise that neighbouring bins do not have in common.
         relief: (k, n) direct light over that of the slopes alone; None where heights do not matter.
+        slope: (n, 2) present slopes of a finer surface; None for those of the taps. Their
+            derivative is that of the taps in any case.
     """
 
     taps: SlopeTaps
@@ -97,6 +99,7 @@ class PlacedBins:
     built: Array | float = 1.0
     independent: float = 1.0
     relief: Array | None = None
+    slope: Array | None = None
 
     def sums(self, law: LightLaw, height_mm: Array, gain: float, light_error: float) -> LightSums:
         """Sums over the data, linear about the present heights.
@@ -109,7 +112,7 @@ class PlacedBins:
         """
         from gelslim_force.joint.light_kernel import light_data, number_nodes, slope_sums
 
-        slope = self.taps.slopes(height_mm)
+        slope = self.taps.slopes(height_mm) if self.slope is None else self.slope
         shape = self.change.shape
         by_slope, scalars = np.empty((*shape, 2)), np.zeros(5)
         by_gain, residual, weight = np.empty((3, *shape))
@@ -150,8 +153,11 @@ def placed_bins(
     displacement_mm: Array,
     near: Mask,
     relief: Array | None = None,
+    finer: tuple[NodeLattice, Array] | None = None,
 ) -> PlacedBins:
     """The valid bins of a frame among the nodes `near` (c,), with the `relief` (c, k) of the nodes.
+
+    `finer` is a finer lattice with the heights (f,) of its places, from which present slopes come.
 
     The line of sight of a bin meets the surface where it is now; the motion (c, 3) of the nodes
     leads from there to the place at rest. Slopes are those of the deformed surface.
@@ -161,8 +167,12 @@ def placed_bins(
     def of(layers: Any) -> Any:
         return np.take(layers.reshape(*layers.shape[:-2], -1), bins, axis=-1)
 
+    taps, slope = lattice.slopes_at(places), None
+    if finer is not None:
+        flat = finer[0].slopes_at(places).slopes(finer[1])
+        slope = np.einsum("nij,nj->ni", taps.turn(displacement_mm[:, :2]), flat)
     return PlacedBins(
-        lattice.slopes_at(places).on_deformed(displacement_mm[:, :2]),
+        taps.on_deformed(displacement_mm[:, :2]),
         of(seen.log_change),
         of(seen.noise),
         of(seen.saturated),
@@ -172,6 +182,7 @@ def placed_bins(
         of(view.gain),
         seen.independent,
         None if relief is None else lattice.values_at(relief, places).T,
+        slope,
     )
 
 

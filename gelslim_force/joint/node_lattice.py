@@ -58,6 +58,13 @@ class SlopeTaps:
         turn_taps(self.nodes, self.along, self.across, lateral_mm, _LEAST_AREA, along, across)
         return SlopeTaps(self.nodes, along, across)
 
+    def turn(self, lateral_mm: Array) -> Array:
+        """(n, 2, 2) F⁻ᵀ of `on_deformed`."""
+        along, across = (self.slopes(lateral_mm[:, axis]) for axis in (0, 1))
+        xx, xy, yx, yy = 1 + along[:, 0], along[:, 1], across[:, 0], 1 + across[:, 1]
+        size = np.maximum(xx * yy - xy * yx, _LEAST_AREA)
+        return np.stack([yy, -yx, -xy, xx], axis=1).reshape(-1, 2, 2) / size[:, None, None]
+
 
 def _cubic_weights(part: Array) -> Array:
     """Weights (..., 4) of cubic convolution at fractions (...) of a cell."""

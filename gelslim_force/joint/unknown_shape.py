@@ -21,6 +21,7 @@ from gelslim_force.contact.shading_change import LostColourError
 from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm, law_of
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator
+from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import JointForces
 from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.light_view import LightView
@@ -37,6 +38,7 @@ from gelslim_force.tracking.marker_noise import noise_px
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.compliance.finer_response import finer_response
 from ifem_export.errors import IfemError
 from ifem_export.markers.interpolation import marker_to_node
 from ifem_export.mesh.surface_lattice import neighbour_matrix, surface_share_mm2
@@ -213,6 +215,7 @@ def unknown_shape(
         strained_from_mm=deep_mm(bundle) if gel == "auto" else 0.0,
         relief=None if bare else NodeRelief.of(_traced(bundle), lattice, deep_mm(bundle)),
         deep_mm=math.inf if gel == "linear" else deep_mm(bundle),
+        finer=None if seen is None else FinerSurface.of(lattice, finer_response(bundle)),
     )
     if seen is None:
         estimator = replace(
