@@ -3,23 +3,22 @@
 The pressure p(r) under the ball has the transform p~(k) = ∫ p r J0(kr) dr = ∫ χ(t) cos(kt) dt over
 0 ≤ t ≤ a, the radius of contact. The surface sinks by w and moves outwards by u,
 
-    w(r) = 2 (1 - ν²)/E ∫ L(kh) p~ J0(kr) dk,    u(r) = 2 (1 - ν²)/E ∫ M(kh) p~ J1(kr) dk,
-    L(x) = (2κ sinh 2x - 4x) / D,                M(x) = (8x² - 2κ (κ-1)(cosh 2x - 1)) / (κ+1) D,
-    D(x) = 2κ cosh 2x + 1 + κ² + 4x²,            κ = 3 - 4ν
+    w(r) = 2 (1 - ν²)/E ∫ L p~ J0(kr) dk,    u(r) = 2 (1 - ν²)/E ∫ M p~ J1(kr) dk,
 
-(L: Hannah 1951; Johnson, Contact Mechanics, 5.8; M follows from the same solution in plane waves).
-Under the ball w = depth - profile, which is a Fredholm equation of the second kind for χ (Lebedev
-and Ufliand 1958),
+with the responses L, M and N of `layer_response`, which contain the skin. Under the ball
+w = depth - profile, which is a Fredholm equation of the second kind for χ (Lebedev and Ufliand 1958),
 
-    χ(t) + 1/π ∫ χ(s) (H(t-s) + H(t+s)) ds = E/(π (1-ν²)) (depth - t/2 ln((R+t)/(R-t))),
-    H(v) = ∫ (L(kh) - 1) cos(kv) dk,
+    λ χ(t) + 1/π ∫ χ(s) (H(t-s) + H(t+s)) ds = E/(π (1-ν²)) (depth - t/2 ln((R+t)/(R-t))),
+    H(v) = ∫ (L - λ) cos(kv) dk,
 
 and the pressure is zero at the rim where χ(a) = 0, which gives the depth. The force is 2π ∫ χ dt.
+λ, the limit of L for short waves, is 1 for a bare gel. In a skin H has a logarithmic singularity,
+which is integrated in closed form.
 
 Friction adds a radial traction q(r) = p₀ (c₁ r/a + c₃ (r/a)³), positive outwards, with the pressure
 p₀ of the contact without friction. With q~(k) = ∫ q r J1(kr) dr it moves the surface outwards by
-2 (1 - ν²)/E ∫ N q~ J1(kr) dk, N(x) = (2κ sinh 2x + 4x) / D, and by reciprocity sinks it by
-2 (1 - ν²)/E ∫ M q~ J0(kr) dk, so that -(2/π) ∫ M q~ cos(kt) dk joins the right-hand side.
+2 (1 - ν²)/E ∫ N q~ J1(kr) dk, and by reciprocity sinks it by 2 (1 - ν²)/E ∫ M q~ J0(kr) dk, so that
+-(2/π) ∫ M q~ cos(kt) dk joins the right-hand side.
 """
 
 from __future__ import annotations
@@ -31,6 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j0, j1
 
+from gelslim_force.presses.layer_response import LayerResponse
+
 Array = NDArray[np.float64]
 _POINTS, _POINTS_PER_THICKNESS = 24, 8
 """Gauss points over the radius of contact, at least, and for each thickness that it holds."""
@@ -38,8 +39,9 @@ _WAVES, _WAVES_PER_THICKNESS = 160, 40
 _LARGEST_WAVE = 18.0
 """Of kh: L - 1 and M less its limit are below 1e-14 beyond it."""
 _HALF_CHORD_POINTS = 16
-_FRICTION_WAVES, _LARGEST_FRICTION_WAVE = 120, 40.0
-"""For the motion outwards by friction, whose transform falls slowly; the largest is of ka."""
+_SHORT_WAVES, _WAVES_PER_TURN, _LARGEST_SHORT_WAVE = 120, 3.5, 40.0
+"""For what friction and skin add, whose transforms fall slowly: points, at least and for each turn
+of the Bessel function at the farthest place, and the largest of ka."""
 _LEAST_SHARE = 1e-3
 """Distance from the middle, over the radius of contact, within which the motion is linear."""
 _RINGS = 24
@@ -53,16 +55,14 @@ class BallOnLayer:
     Attributes:
         contact_mm: Radius of contact a.
         ball_mm: Radius of the ball.
-        thickness_mm: Of the layer.
-        poissons_ratio: Of the layer.
+        layer: The layer in its skin.
         depth_mm: Of the ball's lowest point below the rest surface.
         force_n_per_mpa: Force over Young's modulus.
     """
 
     contact_mm: float
     ball_mm: float
-    thickness_mm: float
-    poissons_ratio: float
+    layer: LayerResponse
     depth_mm: float
     force_n_per_mpa: float
     _density: Array
@@ -71,8 +71,8 @@ class BallOnLayer:
 
     _spectrum: Array
     """Transform q~ (k,) of the radial traction at `_waves`."""
-    _sliding: Array | None = None
-    """Transform q~ (f,) at `_friction_waves`; None without friction."""
+    _traction: tuple[Array, Array] | None = None
+    """Distances (m,) from the middle and the radial traction there, times r dr; None without."""
 
     @classmethod
     def at(
@@ -82,6 +82,7 @@ class BallOnLayer:
         thickness_mm: float,
         poissons_ratio: float,
         friction: tuple[float, float] = (0.0, 0.0),
+        skin_mm: float = 0.0,
     ) -> BallOnLayer:
         """Solve for one radius of contact.
 
@@ -91,26 +92,30 @@ class BallOnLayer:
             thickness_mm: Of the layer, > 0.
             poissons_ratio: Of the layer, below 0.5.
             friction: Coefficients c₁ and c₃ of the radial traction.
+            skin_mm: Plane stiffness of the skin over Young's modulus of the layer, >= 0.
 
         Raises:
             ValueError: An argument is out of its range.
         """
-        if not (0 < contact_mm < ball_mm and thickness_mm > 0 and -1 < poissons_ratio < 0.5):
+        sized = 0 < contact_mm < ball_mm and thickness_mm > 0 and 0 <= skin_mm < np.inf
+        if not (sized and -1 < poissons_ratio < 0.5):
             raise ValueError(
                 f"a contact of {contact_mm:g} mm under a ball of radius {ball_mm:g} mm on a layer "
-                f"of {thickness_mm:g} mm with Poisson's ratio {poissons_ratio:g}: the contact must "
-                "be narrower than the ball, lengths above 0, and the ratio in -1 ... 0.5"
+                f"of {thickness_mm:g} mm with Poisson's ratio {poissons_ratio:g} and a skin of "
+                f"{skin_mm:g} mm: the contact must be narrower than the ball, lengths above 0, the "
+                "skin at least 0, and the ratio in -1 ... 0.5"
             )
+        layer = LayerResponse(thickness_mm, poissons_ratio, skin_mm)
         count = _counted(_POINTS, _POINTS_PER_THICKNESS, contact_mm / thickness_mm)
         nodes, weight = _gauss(count)
         points, weight = contact_mm * (nodes + 1) / 2, contact_mm * weight / 2
         every = np.append(points, contact_mm)
-        kernel = _kernel(every, points, thickness_mm, poissons_ratio) * weight / np.pi
+        kernel, own = _kernel(every, points, weight, layer)
         modulus = 1 / (np.pi * (1 - poissons_ratio**2))
         by_depth = np.full(count + 1, modulus)
         ratio = every / ball_mm
         by_profile = modulus * every * np.arctanh(ratio)
-        system = np.eye(count) + kernel[:-1]
+        system = np.diag(own[:-1]) + kernel[:-1]
         flat, curved = np.linalg.solve(system, np.column_stack([by_depth, by_profile])[:-1]).T
         flat_rim = by_depth[-1] - kernel[-1] @ flat
         curved_rim = by_profile[-1] - kernel[-1] @ curved
@@ -119,8 +124,7 @@ class BallOnLayer:
         smooth = cls(
             contact_mm,
             ball_mm,
-            thickness_mm,
-            poissons_ratio,
+            layer,
             depth,
             float(2 * np.pi * (weight @ density)),
             density,
@@ -130,7 +134,7 @@ class BallOnLayer:
         )
         if friction == (0.0, 0.0):
             return smooth
-        side, spectrum, sliding = smooth._by_friction(friction, every)
+        side, spectrum, traction = smooth._by_friction(friction, every)
         pushed = np.linalg.solve(system, side[:-1])
         pushed_rim = side[-1] - kernel[-1] @ pushed
         depth = float((curved_rim - pushed_rim) / flat_rim)
@@ -142,13 +146,13 @@ class BallOnLayer:
             force_n_per_mpa=force,
             _density=density,
             _spectrum=spectrum,
-            _sliding=sliding,
+            _traction=traction,
         )
 
     def _by_friction(
         self, friction: tuple[float, float], every: Array
-    ) -> tuple[Array, Array, Array]:
-        """Right-hand side at t (n,) of a radial traction, and its transform at both waves."""
+    ) -> tuple[Array, Array, tuple[Array, Array]]:
+        """Right-hand side at t (n,) of a radial traction, its transform, and itself."""
         nodes, rings = _gauss(_RINGS)
         r, ring = self.contact_mm * (nodes + 1) / 2, self.contact_mm * rings / 2
 
@@ -157,18 +161,20 @@ class BallOnLayer:
             pressure = self.pressure(radius.ravel()).reshape(radius.shape)
             return np.asarray(pressure * (friction[0] * part + friction[1] * part**3))
 
-        wave, weight = _waves(self.thickness_mm, self.contact_mm)
-        spectrum = j1(np.outer(wave, r)) @ (ring * traction(r) * r)
+        pushed = ring * traction(r) * r
+        wave, weight = _waves(self.layer.thickness_mm, self.contact_mm)
+        spectrum = j1(np.outer(wave, r)) @ pushed
+        base = np.cos(np.outer(every, wave)) @ (weight * self.layer.by_base(wave)[1] * spectrum)
+        if self.layer.skin_mm:
+            short, parts = _short_waves(self.contact_mm)
+            spread = parts * self.layer.of_half_space(short) * (j1(np.outer(short, r)) @ pushed)
+            base += np.cos(np.outer(every, short)) @ spread
+            return -2 / np.pi * base, spectrum, (r, pushed)
         turn, turns = _gauss(_HALF_CHORD_POINTS)
         angle = np.pi / 4 * (turn + 1)
         inner = traction(np.outer(every, np.sin(angle))) @ (np.pi / 4 * turns)
-        half_space = ring @ traction(r) - every * inner
-        _, outward = _kernels(wave * self.thickness_mm, self.poissons_ratio)
-        limit = _limit(self.poissons_ratio)
-        layer = np.cos(np.outer(every, wave)) @ (weight * (outward - limit) * spectrum)
-        fine, _ = _friction_waves(self.contact_mm)
-        sliding = j1(np.outer(fine, r)) @ (ring * traction(r) * r)
-        return -2 / np.pi * (limit * half_space + layer), spectrum, sliding
+        half_space = self.layer.rigid_limit * (ring @ traction(r) - every * inner)
+        return -2 / np.pi * (half_space + base), spectrum, (r, pushed)
 
     def motion(self, r_mm: Array) -> tuple[Array, Array]:
         """Motion (n,) outwards and (n,) along z of the surface at distances (n,) from the middle.
@@ -176,26 +182,45 @@ class BallOnLayer:
         It does not depend on Young's modulus; z is negative where the surface sinks.
         """
         r = np.asarray(r_mm, dtype=float)
-        wave, weight = _waves(self.thickness_mm, self.contact_mm)
+        wave, weight = _waves(self.layer.thickness_mm, self.contact_mm)
         spectrum = np.cos(np.outer(wave, self._points)) @ (self._weight * self._density)
-        sinking, outward = _kernels(wave * self.thickness_mm, self.poissons_ratio)
-        scale = 2 * (1 - self.poissons_ratio**2)
+        sinking, outward = self.layer.by_base(wave)
+        scale = 2 * (1 - self.layer.poissons_ratio**2)
         turn = np.outer(r, wave)
-        lower = j0(turn) @ (weight * (sinking - 1) * spectrum)
-        aside = j1(turn) @ (weight * (outward - _limit(self.poissons_ratio)) * spectrum)
-        aside += _limit(self.poissons_ratio) * self._enclosed(r)
-        if self._sliding is not None:
-            fine, parts = _friction_waves(self.contact_mm)
-            along = _tangential(fine * self.thickness_mm, self.poissons_ratio)
-            aside += j1(np.outer(r, fine)) @ (parts * along * self._sliding)
+        lower = j0(turn) @ (weight * (sinking * spectrum + outward * self._spectrum))
+        aside = j1(turn) @ (weight * outward * spectrum)
         outside = np.maximum(r, self.contact_mm)[:, None]
         apart = np.sqrt(np.maximum(outside**2 - self._points**2, 1e-300))
-        lower += (self._weight * self._density / apart).sum(axis=1)
-        lower += j0(turn) @ (weight * (outward - _limit(self.poissons_ratio)) * self._spectrum)
+        lower += self.layer.shallow * (self._weight * self._density / apart).sum(axis=1)
+        if not self.layer.skin_mm:
+            aside += self.layer.rigid_limit * self._enclosed(r)
+        short_lower, short_aside = self._short_motion(r)
+        lower, aside = lower + short_lower, aside + short_aside
         inside = r < self.contact_mm
         ball = np.minimum(r, self.contact_mm) ** 2
         profile = ball / (self.ball_mm + np.sqrt(self.ball_mm**2 - ball))
         return scale * aside, np.where(inside, profile - self.depth_mm, -scale * lower)
+
+    def _short_motion(self, r: Array) -> tuple[Array, Array]:
+        """What short waves add (n,) to the sinking and outwards: by friction, and by the skin."""
+        if self._traction is None and not self.layer.skin_mm:
+            return np.zeros(len(r)), np.zeros(len(r))
+        reach = float(r.max(initial=0.0)) if self.layer.skin_mm else 0.0
+        wave, weight = _short_waves(self.contact_mm, reach)
+        outwards, downwards = np.zeros(len(wave)), np.zeros(len(wave))
+        if self._traction is not None:
+            at, amount = self._traction
+            sliding = j1(np.outer(wave, at)) @ amount
+            outwards += self.layer.along(wave) * sliding
+        if self.layer.skin_mm:
+            limit, spread = self.layer.rigid_limit, self.layer.of_half_space(wave)
+            pressed = np.cos(np.outer(wave, self._points)) @ (self._weight * self._density)
+            outwards += spread * pressed
+            downwards += limit * spread * pressed
+            if self._traction is not None:
+                downwards += spread * sliding
+        turn = np.outer(r, wave)
+        return j0(turn) @ (weight * downwards), j1(turn) @ (weight * outwards)
 
     def pressure(self, r_mm: Array) -> Array:
         """Pressure (n,) over Young's modulus at distances (n,) from the middle.
@@ -252,39 +277,33 @@ def _waves(thickness_mm: float, contact_mm: float) -> tuple[Array, Array]:
     return half * (nodes + 1), half * weight
 
 
-def _friction_waves(contact_mm: float) -> tuple[Array, Array]:
-    nodes, weight = _gauss(_FRICTION_WAVES)
-    half = _LARGEST_FRICTION_WAVE / contact_mm / 2
-    return half * (nodes + 1), half * weight
+def _short_waves(contact_mm: float, reach_mm: float = 0.0) -> tuple[Array, Array]:
+    """Waves that show friction and skin up to a distance from the middle."""
+    largest = _LARGEST_SHORT_WAVE / contact_mm
+    count = max(_SHORT_WAVES, int(_WAVES_PER_TURN * largest * reach_mm / (2 * np.pi)))
+    nodes, weight = _gauss(count)
+    return largest / 2 * (nodes + 1), largest / 2 * weight
 
 
-def _kernel(t: Array, s: Array, thickness_mm: float, poissons_ratio: float) -> Array:
-    """H(t - s) + H(t + s) for t (n,) and s (m,)."""
-    wave, weight = _waves(thickness_mm, float(t[-1]))
-    sinking, _ = _kernels(wave * thickness_mm, poissons_ratio)
+def _kernel(t: Array, s: Array, weight: Array, layer: LayerResponse) -> tuple[Array, Array]:
+    """Factors (n + 1, n) of χ(s) in the equation at t (n + 1,), and those (n + 1,) of χ(t) itself.
+
+    The last t is the rim, the others are the points s.
+    """
+    wave, parts = _waves(layer.thickness_mm, float(t[-1]))
+    sinking, _ = layer.by_base(wave)
     # cos(k(t-s)) + cos(k(t+s)) = 2 cos(kt) cos(ks)
-    rows = np.cos(np.outer(t, wave)) * (2 * weight * (sinking - 1))
-    return np.asarray(rows @ np.cos(np.outer(wave, s)))
-
-
-def _kernels(x: Array, poissons_ratio: float) -> tuple[Array, Array]:
-    """L and M (n,) of the layer."""
-    kappa = 3 - 4 * poissons_ratio
-    e = np.exp(-2 * x)
-    bottom = kappa * (1 + e * e) + (1 + kappa**2 + 4 * x * x) * e
-    sinking = (kappa * (1 - e * e) - 4 * x * e) / bottom
-    waving = (1 - e) ** 2 * kappa * (kappa - 1)
-    return sinking, (8 * x * x * e - waving) / (kappa + 1) / bottom
-
-
-def _tangential(x: Array, poissons_ratio: float) -> Array:
-    """N (n,) of the layer."""
-    kappa = 3 - 4 * poissons_ratio
-    e = np.exp(-2 * x)
-    bottom = kappa * (1 + e * e) + (1 + kappa**2 + 4 * x * x) * e
-    return np.asarray((kappa * (1 - e * e) + 4 * x * e) / bottom)
-
-
-def _limit(poissons_ratio: float) -> float:
-    """M of a half-space."""
-    return -(1 - 2 * poissons_ratio) / (2 * (1 - poissons_ratio))
+    rows = np.cos(np.outer(t, wave)) * (2 * parts * sinking)
+    found = rows @ np.cos(np.outer(wave, s)) * weight / np.pi
+    own = np.full(len(t), layer.shallow)
+    if layer.skin_mm:
+        apart = np.abs(t[:, None] - s)
+        apart[: len(s)][np.diag_indices(len(s))] = np.inf
+        near = layer.skin_kernel(np.where(np.isinf(apart), 1.0, apart))
+        near = np.where(np.isinf(apart), 0.0, near)
+        # χ(s) - χ(t) removes the singularity at s = t.
+        singular = (near + layer.skin_kernel(t[:, None] + s)) * weight / np.pi
+        whole = layer.skin_integral(t[-1] - t) + layer.skin_integral(t[-1] + t)
+        own += whole / np.pi - singular.sum(axis=1)
+        found += singular
+    return found, own

@@ -1,11 +1,13 @@
 """Young's modulus and thickness of a built gel from presses of a ball under known loads.
 
 One fit explains all presses: their loads, the sizes of their patches and the motion of the markers
-in the picture. Free are Young's modulus, thickness and Poisson's ratio of the gel within what the
-design knows, and of each press its radius of contact, place and friction. For one thickness the
+in the picture. Free are Young's modulus, thickness, Poisson's ratio and skin of the gel within what
+the design knows, and of each press its radius of contact, place and friction. For one thickness the
 patch gives the depth, and the load then gives the modulus; presses of different size separate
 both, because the force of a thin layer grows faster with the patch than that of a thick one. The
-markers show the depth and the motion beside the ball, which tell the thickness without a load.
+markers show the depth and the motion beside the ball, which tell the thickness without a load. A skin
+shows in the markers too: it prevents the motion aside, the more the smaller the patch, and hardly
+changes load and depth.
 
 The errors that all presses have in common, such as that of the law by which the patch is found,
 are parameters of their own.
@@ -28,6 +30,7 @@ from gelslim_force.presses.press_rows import (
     COMMON,
     RATIO,
     SIZE,
+    SKIN,
     YOUNG,
     PressRows,
     PressState,
@@ -42,6 +45,10 @@ Array = NDArray[np.float64]
 _YOUNG_SIGMA, _THICKNESS_SIGMA = 1.0, 0.2
 """Of the logarithms, before the presses: they hardly matter."""
 FREE_RATIO_SIGMA = 0.03
+FREE_SKIN_SIGMA = 2.0
+"""Of `press_model.skin_parameter`: skins up to some fifty times as stiff as the gel."""
+_KNOWN = 1e-9
+"""Standard deviation of what is known."""
 BALL_SIGMA = 0.002
 """Relative standard deviation of the diameter of a bearing ball, with its measurement."""
 _SIZE_SIGMA = 0.01
@@ -59,10 +66,14 @@ class GelPrior:
     Attributes:
         ratio_sigma: Standard deviation of Poisson's ratio; 0 takes the design's value.
         ball_sigma: Relative standard deviation of the diameter of the ball.
+        skin: The skin, as in `press_model.skin_parameter`.
+        skin_sigma: Standard deviation of it; 0 takes it as known.
     """
 
     ratio_sigma: float = 0.0
     ball_sigma: float = BALL_SIGMA
+    skin: float = 0.0
+    skin_sigma: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +117,8 @@ class FittedGel:
         log_thickness: ln of the thickness over that of the design.
         poissons_ratio: Poisson's ratio.
         log_ball: ln of the ball's radius over the given one.
-        covariance: (4, 4) of these.
+        skin: The skin, as in `press_model.skin_parameter`.
+        covariance: (5, 5) of these.
         load_scatter: Factor by which the loads scatter more than stated; at least 1.
         marker_scatter: The same for the markers.
         presses: The presses.
@@ -116,6 +128,7 @@ class FittedGel:
     log_thickness: float
     poissons_ratio: float
     log_ball: float
+    skin: float
     covariance: Array
     load_scatter: float
     marker_scatter: float
@@ -162,6 +175,7 @@ class _Fit:
         """Unknowns from the patches as seen, and the modulus that the loads then give."""
         common = np.zeros(COMMON)
         common[RATIO] = self.view.bundle.material.poissons_ratio
+        common[SKIN] = self.prior.skin
         own = tuple(PressState(m.start(), np.zeros(m.friction_px.shape[-1])) for m in self.models)
         force = [
             model.expected(common[1:SIZE], press.local, press.friction).log_force
@@ -171,9 +185,11 @@ class _Fit:
         return _State(common, own, np.eye(COMMON))
 
     def sigma_before(self) -> Array:
-        """(5,) standard deviations of the common unknowns before the presses."""
-        ratio = max(self.prior.ratio_sigma, 1e-9)
-        return np.array([_YOUNG_SIGMA, _THICKNESS_SIGMA, ratio, self.prior.ball_sigma, _SIZE_SIGMA])
+        """(6,) standard deviations of the common unknowns before the presses."""
+        prior = self.prior
+        ratio, skin = max(prior.ratio_sigma, _KNOWN), max(prior.skin_sigma, _KNOWN)
+        known = [_YOUNG_SIGMA, _THICKNESS_SIGMA, ratio, prior.ball_sigma, skin, _SIZE_SIGMA]
+        return np.array(known)
 
     def rows(self, state: _State) -> list[PressRows]:
         """The data of all presses."""
@@ -209,7 +225,7 @@ class _Fit:
                 hessian += rows.by_common.T @ rows.by_common - mixed.T @ eliminated[:, :-1]
                 slope += rows.by_common.T @ rows.residual - mixed.T @ eliminated[:, -1]
                 parts.append(eliminated)
-            step = np.linalg.solve(hessian, slope)
+            step = _step(hessian, slope, -float(state.common[SKIN]))
             if not np.isfinite(step).all():
                 raise PressError(
                     "ball", "no gel explains these presses: check ball, loads and reference picture"
@@ -235,6 +251,18 @@ class _Fit:
         return _State(common, tuple(own), covariance)
 
 
+def _step(hessian: Array, slope: Array, least_skin: float) -> Array:
+    """Solution (6,) of the normal equations whose step of the skin is not below `least_skin`."""
+    step = np.asarray(np.linalg.solve(hessian, slope), dtype=float)
+    if not step[SKIN] < least_skin:
+        return step
+    free = np.delete(np.arange(COMMON), SKIN)
+    step[SKIN] = least_skin
+    others = slope[free] - hessian[free, SKIN] * least_skin
+    step[free] = np.linalg.solve(hessian[np.ix_(free, free)], others)
+    return step
+
+
 def _as_found(fit: _Fit, state: _State) -> FittedGel:
     presses = []
     for model, load, own in zip(fit.models, fit.loads, state.own, strict=True):
@@ -254,8 +282,8 @@ def _as_found(fit: _Fit, state: _State) -> FittedGel:
                 float(np.sqrt(np.mean(marker_sigma_px(fit.view, model) ** 2))),
             )
         )
-    young, thickness, ratio, ball, _ = (float(v) for v in state.common)
+    young, thickness, ratio, ball, skin, _ = (float(v) for v in state.common)
     return FittedGel(
-        young, thickness, ratio, ball, state.covariance[:SIZE, :SIZE], fit.scatter.load,
+        young, thickness, ratio, ball, skin, state.covariance[:SIZE, :SIZE], fit.scatter.load,
         fit.scatter.marker, tuple(presses),
     )  # fmt: skip

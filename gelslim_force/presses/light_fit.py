@@ -69,7 +69,7 @@ def press_light(
         contact: The ball on the gel.
         place_mm: (2,) where it presses.
     """
-    reach = contact.contact_mm + _REACH * contact.thickness_mm
+    reach = contact.contact_mm + _REACH * contact.layer.thickness_mm
     radius = np.linspace(0, reach + 1.0, _STEPS)
     outward, height = contact.motion(radius)
     steep = np.gradient(height, radius)

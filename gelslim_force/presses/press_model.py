@@ -22,14 +22,15 @@ FRICTION = 0.3
 _RIM_POINTS = 24
 _REACH = 4.0
 """Distance beyond the rim, in thicknesses, up to which markers count."""
-_STEPS = (1e-3, 1e-4, 1e-3, 1e-3, 1e-3, 1e-3)
-"""Of ln thickness, Poisson's ratio, ln ball, ln contact, x and y for finite differences."""
+_STEPS = (1e-3, 1e-4, 1e-3, 0.02, 1e-3, 1e-3, 1e-3)
+"""Of ln thickness, Poisson's ratio, ln ball, skin, ln contact, x and y for finite differences."""
 _SMALL_MM = 1e-4
 """Motion for the derivative of a dot's place in the picture."""
 _RADIAL, _FRICTION_STEP = (2, 6), 0.01
 """Parts of the friction that are radial, see `_fields`, and their step."""
-GEL, LOCAL = 3, 3
-"""Parameters of gel and ball (ln thickness, ratio, ln ball) and of a press (ln contact, x, y)."""
+GEL, LOCAL = 4, 3
+"""Parameters of gel and ball (ln thickness, ratio, ln ball, skin as in `skin_parameter`) and of a
+press (ln contact, x, y)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +113,7 @@ class PressModel:
         return np.array([np.log(self.seen.patch.size_mm), *self.seen.patch.centre_mm])
 
     def expected(self, gel: Array, local: Array, friction: Array) -> Expected:
-        """What shows for gel and ball (3,), a press (3,) and its friction (t,).
+        """What shows for gel and ball (4,), a press (3,) and its friction (t,).
 
         Raises:
             ValueError: The values are impossible.
@@ -123,6 +124,7 @@ class PressModel:
             self._thickness_mm * float(np.exp(gel[0])),
             float(gel[1]),
             (float(friction[_RADIAL[0]]), float(friction[_RADIAL[1]])),
+            skin_length_mm(float(gel[3]), self._thickness_mm),
         )
         offset = self._dots.rims_mm[..., :2] - local[1:]
         motion = RadialMotion.of(contact, float(np.hypot(offset[..., 0], offset[..., 1]).max()))
@@ -135,7 +137,7 @@ class PressModel:
         )
 
     def linearised(self, gel: Array, local: Array, friction: Array) -> Linearised:
-        """What shows, and its derivatives by the 6 + t parameters: `GEL`, `LOCAL`, friction."""
+        """What shows, and its derivatives by the 7 + t parameters: `GEL`, `LOCAL`, friction."""
         base = self.expected(gel, local, friction)
         every = np.concatenate([gel, local, friction])
         force, rim = np.zeros(len(every)), np.zeros(len(every))
@@ -184,6 +186,19 @@ class PressModel:
         moved[:, 2] = 0.0
         small = _SMALL_MM / max(float(np.abs(moved).max()), 1e-12)
         return self._dots.shift_px(small * moved.reshape(rims.shape)) / small
+
+
+def skin_parameter(plane_mm: float, thickness_mm: float) -> float:
+    """The skin as an unknown: ln(1 + T/(E h)) of a skin of T/E on a layer of h.
+
+    It is linear in a soft skin and logarithmic in a stiff one, whose stiffness matters no more.
+    """
+    return float(np.log1p(plane_mm / thickness_mm))
+
+
+def skin_length_mm(parameter: float, thickness_mm: float) -> float:
+    """Plane stiffness of the skin over Young's modulus of the gel, T/E; see `skin_parameter`."""
+    return thickness_mm * float(np.expm1(parameter))
 
 
 def _fields(offset: Array) -> Array:

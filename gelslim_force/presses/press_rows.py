@@ -18,9 +18,10 @@ from gelslim_force.presses.press_model import FRICTION, GEL, LOCAL, Expected, Pr
 from gelslim_force.presses.seen_press import PressView
 
 Array = NDArray[np.float64]
-YOUNG, THICKNESS, RATIO, BALL, SIZE = range(5)
-COMMON = 5
-"""ln E, ln thickness, Poisson's ratio, ln ball, and the common relative error of all sizes."""
+YOUNG, THICKNESS, RATIO, BALL, SKIN, SIZE = range(6)
+COMMON = 6
+"""ln E, ln thickness, Poisson's ratio, ln ball, skin as in `press_model.skin_parameter`, and the
+common relative error of all sizes."""
 LAW_SIGMA = 0.01
 """Relative error of the force at a size: large strain and friction."""
 MARKER_MM, MARKER_SHARE = 0.003, 0.02
@@ -52,7 +53,7 @@ class PressRows:
 
     Attributes:
         residual: (n,).
-        by_common: (n, 5) derivative of what is expected by the common unknowns.
+        by_common: (n, 6) derivative of what is expected by the common unknowns.
         by_own: (n, 3 + t) by those of the press.
         heads: (4,) residuals of load, size and place over their deviations, not weighted.
         markers: (m, 2) those of the markers.
@@ -88,7 +89,7 @@ def press_rows(
     own: PressState,
     scatter: Scatter,
 ) -> PressRows:
-    """The rows of one press at common unknowns (5,) and its own."""
+    """The rows of one press at common unknowns (6,) and its own."""
     here = model.linearised(common[1:SIZE], own.local, own.friction)
     heads, head_sigma = _heads(view, model, load, common, own, here.base, scatter)
     sigma = scatter.marker * marker_sigma_px(view, model)

@@ -39,8 +39,8 @@ class RadialMotion:
     def of(cls, contact: BallOnLayer, reach_mm: float) -> RadialMotion:
         """Sample a contact up to a distance (mm) from its middle."""
         rim = contact.contact_mm
-        beyond = max(reach_mm - rim, contact.thickness_mm)
-        count = _OUTSIDE + int(_OUTSIDE_PER_THICKNESS * beyond / contact.thickness_mm)
+        beyond = max(reach_mm - rim, contact.layer.thickness_mm)
+        count = _OUTSIDE + int(_OUTSIDE_PER_THICKNESS * beyond / contact.layer.thickness_mm)
         inner = np.linspace(0, np.sqrt(rim), _INSIDE)
         outer = np.linspace(0, np.sqrt(beyond), count)
         radius = np.concatenate([np.maximum(rim - inner**2, 0.0), rim + outer**2])

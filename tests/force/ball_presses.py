@@ -37,6 +37,7 @@ class Built:
         poissons_ratio: As designed too.
         ball_mm: Radius of the ball that presses.
         sticking: Whether the gel sticks to the ball.
+        skin_n_per_mm: Membrane stiffness of what covers the gel.
         light: Gain of the light of each colour in the middle of the gel.
         light_tilt: Change of the gain from the middle to the far end, relative.
     """
@@ -46,6 +47,7 @@ class Built:
     poissons_ratio: float = 0.48
     ball_mm: float = 6.0
     sticking: bool = False
+    skin_n_per_mm: float = 0.0
     light: tuple[float, float, float] | None = None
     light_tilt: float = 0.0
 
@@ -78,8 +80,9 @@ def ball_picture(
 ) -> NDArray[np.uint8]:
     """The picture of the ball under a load."""
     disc = pressed_disc(
-        built.ball_mm, THICKNESS_MM * built.thickness, built.poissons_ratio, built.sticking
-    )
+        built.ball_mm, THICKNESS_MM * built.thickness, built.poissons_ratio, built.sticking,
+        built.skin_n_per_mm / (YOUNG_MPA * built.young),
+    )  # fmt: skip
     radius, outward, height = disc.at_force(load_n / (YOUNG_MPA * built.young))
     assert radius < disc.contact_mm[-1], "the load is beyond the states that were solved"
     # Where the surface is now: it moved outwards too.

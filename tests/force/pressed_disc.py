@@ -1,7 +1,8 @@
 """A ball pressed on a disc of gel, by axisymmetric finite elements: truth for the calibrations.
 
 Eight-node quadrilaterals with 2 x 2 Gauss points in (r, z), bonded below, free outside; the disc is
-20 mm in radius. Ring after ring of surface nodes comes to rest on the ball, without friction or
+20 mm in radius. A skin is a membrane of line elements on the surface, with the same shape functions
+as their cells. Ring after ring of surface nodes comes to rest on the ball, without friction or
 sticking where it touches. It shares nothing with the force pipeline, neither elements nor closed
 forms.
 """
@@ -18,6 +19,8 @@ from scipy.sparse.linalg import splu
 
 Array = NDArray[np.float64]
 DISC_MM, FINE_MM, STEP_MM = 20.0, 4.2, 0.1
+SKIN_RATIO = 0.3
+"""Poisson's ratio of the skin."""
 _GAUSS = 1 / np.sqrt(3)
 _CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float)
 _MIDDLES = np.array([(0, -1), (1, 0), (0, 1), (-1, 0)], dtype=float)
@@ -53,10 +56,19 @@ class PressedDisc:
 
 @cache
 def pressed_disc(
-    ball_mm: float, thickness_mm: float, poissons_ratio: float, sticking: bool = False
+    ball_mm: float,
+    thickness_mm: float,
+    poissons_ratio: float,
+    sticking: bool = False,
+    skin_mm: float = 0.0,
 ) -> PressedDisc:
-    """All states up to a contact of `FINE_MM` less a few steps."""
+    """All states up to a contact of `FINE_MM` less a few steps.
+
+    `skin_mm` is the membrane stiffness N = E t of a skin over Young's modulus of the gel.
+    """
     r, surface = surface_stiffness(thickness_mm, poissons_ratio)
+    if skin_mm:
+        surface[0::2, 0::2] += membrane_stiffness(r, skin_mm)
     count = len(r)
     profile = ball_mm - np.sqrt(np.maximum(ball_mm**2 - r * r, 0.0))
     free = np.arange(1, 2 * count)
@@ -101,6 +113,28 @@ def surface_stiffness(thickness_mm: float, poissons_ratio: float) -> tuple[Array
     coupling = stiffness[inside][:, own].toarray()
     solved = splu(sparse.csc_array(stiffness[inside][:, inside])).solve(coupling)
     return points[top, 0], stiffness[own][:, own].toarray() - coupling.T @ solved
+
+
+def membrane_stiffness(r_mm: Array, skin_mm: float) -> Array:
+    """Radial stiffness (n, n) of a membrane on the surface nodes, for a gel of E = 1 MPa.
+
+    Energy of plane stress, N / (2 (1 - ν²)) (εr² + εt² + 2 ν εr εt) with εr = u', εt = u/r, over
+    the rings of cells of three nodes.
+    """
+    nu = SKIN_RATIO
+    law = skin_mm / (1 - nu**2) * np.array([[1.0, nu], [nu, 1.0]])
+    found = np.zeros((len(r_mm), len(r_mm)))
+    points, weights = np.polynomial.legendre.leggauss(3)
+    for first in range(0, len(r_mm) - 1, 2):
+        own = slice(first, first + 3)
+        half = (r_mm[first + 2] - r_mm[first]) / 2
+        for xi, weight in zip(points, weights, strict=True):
+            shape = np.array([xi * (xi - 1) / 2, 1 - xi * xi, xi * (xi + 1) / 2])
+            slope = np.array([xi - 0.5, -2 * xi, xi + 0.5]) / half
+            radius = shape @ r_mm[own]
+            strain = np.vstack([slope, shape / radius])
+            found[own, own] += 2 * np.pi * radius * weight * half * strain.T @ law @ strain
+    return found
 
 
 def _lattice(radii: Array, levels: Array) -> tuple[Array, Array, Array]:
