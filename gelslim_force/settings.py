@@ -120,7 +120,7 @@ class PipelineSettings:
         """The law of the gel, where it is not that of the operator alone."""
         if law_of(bundle, self.gel) == "linear":
             return None
-        strained = FiniteStrainForce(bundle)
+        strained = FiniteStrainForce(bundle, membranes=bundle.membranes)
         if self.gel == "neo_hookean":
             return strained
         return DepthLaw(operator, strained, deep_mm(bundle))

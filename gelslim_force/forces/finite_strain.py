@@ -18,8 +18,11 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 from ifem_export.bundle.bundle import Bundle
+from ifem_export.elements.membrane import membrane_stiffness
+from ifem_export.elements.skin import Membrane
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 from ifem_export.operators.pad_system import PadSystem, checked_field
 from ifem_export.operators.solver import ConvergenceError, Solver, inner_solver
@@ -45,6 +48,8 @@ class FiniteStrainForce:
     """Residual force on the inner nodes, relative to the surface forces."""
     most_steps: int = 12
     inner_rtol: float = 1e-3
+    membranes: tuple[Membrane, ...] = ()
+    """Coat and fabric on the gel, as a linear law has them."""
 
     @cached_property
     def system(self) -> PadSystem:
@@ -68,6 +73,16 @@ class FiniteStrainForce:
         ConvergenceError if the iteration does not converge.
         """
         u = checked_field(displacement_mm, self.system.columns)
+        if not self.membranes:
+            return self._gel_force(u)
+        return self._gel_force(u) + (self._skin @ u.ravel()).reshape(-1, 3)
+
+    @cached_property
+    def _skin(self) -> sparse.csr_array:
+        """Stiffness (3c, 3c) of the membranes, whose strain stays small."""
+        return membrane_stiffness(self.bundle.mesh, self.membranes)
+
+    def _gel_force(self, u: Array) -> Array:
         motion = np.zeros((self.bundle.mesh.n_nodes, 3))
         motion[-self.system.columns :] = u
         if self.system.layers == 1:

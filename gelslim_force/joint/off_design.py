@@ -61,7 +61,7 @@ class OffDesign:
         markers, nodes = nodes_to_markers.shape
         found = np.zeros((len(more), nodes, 3, markers, 2), dtype=np.float32)
         for derivative, (bundle, step) in zip(found, more, strict=True):
-            varied = SurfaceCompliance(bundle)
+            varied = SurfaceCompliance(bundle, skin=bundle.membranes)
             for first in range(0, nodes, _BATCH):
                 part = np.arange(first, min(first + _BATCH, nodes))
                 change = (varied.columns(part) - compliance.columns(part)) / step

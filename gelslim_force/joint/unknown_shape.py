@@ -184,7 +184,7 @@ def unknown_shape(
     chosen = settings or (MARKERS_ALONE if reference is None else JointSettings())
     if light is not None:
         chosen = chosen.with_light(light)
-    followed = calibration.reference
+    followed, skin = calibration.reference, bundle.membranes
     points_mm = np.asarray(bundle.mesh.surface_mm)
     cell_mm = np.asarray(bundle.mesh.cell_size_mm[:2])
     lattice = NodeLattice.of(points_mm, cell_mm)
@@ -201,7 +201,7 @@ def unknown_shape(
         surface_share_mm2(bundle.mesh),
         neighbour_matrix(points_mm, cell_mm),
         lattice,
-        Responses(SurfaceCompliance(bundle), to_markers),
+        Responses(SurfaceCompliance(bundle, skin=skin), to_markers),
         view,
         to_markers,
         lattice.interpolation(view.rest_mm) - to_markers,
@@ -211,7 +211,7 @@ def unknown_shape(
         None if seen is None else LightLaw.of(_traced(bundle), chosen.gamma),
         bundle.material.youngs_modulus_mpa,
         chosen,
-        strained=None if gel == "linear" else FiniteStrainForce(bundle),
+        strained=None if gel == "linear" else FiniteStrainForce(bundle, membranes=skin),
         strained_from_mm=deep_mm(bundle) if gel == "auto" else 0.0,
         relief=None if bare else NodeRelief.of(_traced(bundle), lattice, deep_mm(bundle)),
         deep_mm=math.inf if gel == "linear" else deep_mm(bundle),

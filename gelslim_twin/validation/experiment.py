@@ -156,8 +156,10 @@ class TruthGel:
 
     @cached_property
     def compliance(self) -> SurfaceCompliance:
-        """Surface compliance of the finer pad."""
-        return SurfaceCompliance(truth_pad(self.sensor), self.folder)
+        """Surface compliance of the finer pad in its skin."""
+        return SurfaceCompliance(
+            truth_pad(self.sensor), self.folder, self.sensor.bundle.membranes
+        )
 
     @property
     def law(self) -> Law:

@@ -21,7 +21,7 @@ from ifem_export.assembly.assembly import mesh_stiffness
 from ifem_export.bundle.imported import Imported
 from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
-from ifem_export.elements.skin import Skin
+from ifem_export.elements.skin import Membrane, Skin
 from ifem_export.errors import IfemError
 from ifem_export.markers.field import MarkerField, marker_field
 from ifem_export.mesh.outline import RoundedRectangle
@@ -75,7 +75,7 @@ class Bundle:
         stored_adjoint: Adjoint fields (6, c, 3) as stored with the bundle, in N/mm and N/rad, or
             None; see `adjoint`.
         skin: Coat and fabric on the gel; None where the gel counts as bare. The operators of the
-            surface are those of the bare gel.
+            surface contain them.
         imported: What is known of a sensor that was not generated; None for a generated one.
     """
 
@@ -102,6 +102,7 @@ class Bundle:
         rung: Rung | None = None,
         *,
         budget: Budget | None = None,
+        membranes: tuple[Membrane, ...] | None = None,
         **parameters: Any,
     ) -> SurfaceOperator:
         """Make the operator on the outer surface, F = S u and u = C F.
@@ -111,6 +112,7 @@ class Bundle:
         Args:
             rung: Name of the operator, with its `parameters`.
             budget: Allowed error and time, by which the ladder chooses the operator.
+            membranes: Coat and fabric on the gel; None takes those of the bundle.
             **parameters: See `ifem_export.operators.surface_operator.surface_operator`.
 
         Returns:
@@ -127,7 +129,15 @@ class Bundle:
         rung = rung or "pcg"
         if rung not in _WITHOUT_ADJOINT:
             parameters = {"adjoint": self.adjoint, **parameters}
+        parameters["membranes"] = self.membranes if membranes is None else membranes
         return surface_operator(self.mesh, self.material, self.formulation, rung, **parameters)
+
+    @property
+    def membranes(self) -> tuple[Membrane, ...]:
+        """Coat and fabric that the operators of the surface contain; none on a crowned pad."""
+        if self.skin is None or self.mesh.surface_shift is not None:
+            return ()
+        return self.skin.membranes
 
     @cached_property
     def stiffness_matrix(self) -> sparse.csr_array:
@@ -153,6 +163,30 @@ class Bundle:
     def with_adjoint(self) -> Bundle:
         """The bundle with its adjoint fields stored. Raises as `adjoint`."""
         return replace(self, stored_adjoint=self.adjoint.forces)
+
+    def with_skin(self, stiffness_n_per_mm: float) -> Bundle:
+        """The same sensor in a skin of another membrane stiffness.
+
+        Coat and fabric of the design keep their proportion; without any it is a coat.
+
+        Args:
+            stiffness_n_per_mm: Membrane stiffness of all layers together, >= 0.
+
+        Raises:
+            IfemError: The stiffness is negative or not finite.
+        """
+        layers = self.designed_skin
+        if stiffness_n_per_mm == 0:
+            bare = replace(layers, coat=None, fabric=None)
+            return replace(self, skin=None if bare.friction is None else bare)
+        return replace(self, skin=layers.scaled(stiffness_n_per_mm / layers.stiffness_n_per_mm))
+
+    @property
+    def designed_skin(self) -> Skin:
+        """The skin; a coat of 1 N/mm where the gel counts as bare."""
+        if self.skin is not None and self.skin.membranes:
+            return self.skin
+        return Skin(Membrane(1.0), friction=None if self.skin is None else self.skin.friction)
 
     def with_gel(self, material: Material, thickness_ratio: float = 1.0) -> Bundle:
         """The same sensor with a gel of another material and thickness.

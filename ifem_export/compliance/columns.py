@@ -68,8 +68,8 @@ class SurfaceCompliance:
 
     @cached_property
     def operator(self) -> SurfaceOperator:
-        """The exact operator of the pad."""
-        return self.bundle.surface_operator("factor")
+        """The exact operator of the pad in its skin."""
+        return self.bundle.surface_operator("factor", membranes=self.skin)
 
     @property
     def system(self) -> PadSystem:
@@ -77,15 +77,10 @@ class SurfaceCompliance:
         system: PadSystem = self.operator.system  # type: ignore[attr-defined]
         return system
 
-    @cached_property
+    @property
     def _stiffness(self) -> sparse.csr_array:
         """Stiffness of the free nodes, with the skin."""
-        bare = self.system.stiffness
-        if not self.skin:
-            return bare
-        from ifem_export.elements.membrane import membrane_stiffness, with_skin
-
-        return with_skin(bare, membrane_stiffness(self.bundle.mesh, self.skin))
+        return self.system.stiffness
 
     @cached_property
     def _factor(self) -> SuperLU | RowFactor:

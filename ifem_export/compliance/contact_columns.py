@@ -78,7 +78,7 @@ class ContactCompliance:
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """The columns."""
-        return SurfaceCompliance(self.bundle)
+        return SurfaceCompliance(self.bundle, skin=self.bundle.membranes)
 
     @property
     def system(self) -> PadSystem:

@@ -94,6 +94,16 @@ def with_skin(pad: sparse.csr_array, skin: sparse.csr_array) -> sparse.csr_array
     return sparse.csr_array((data, found.indices, found.indptr), shape=pad.shape)
 
 
+def membrane_blocks(
+    size_mm: tuple[float, float], membranes: Sequence[Membrane], shape: tuple[int, int]
+) -> Array:
+    """As `membrane_symbol`, for all ky of the lattice."""
+    half = membrane_symbol(size_mm, membranes, shape)
+    # A wave along -y is the mirror image of one along y.
+    mirrored = half[-2:0:-1] * np.array([[1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, 1.0]])
+    return np.concatenate([half, mirrored])
+
+
 def membrane_symbol(
     size_mm: tuple[float, float], membranes: Sequence[Membrane], shape: tuple[int, int]
 ) -> Array:

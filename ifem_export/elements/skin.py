@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,19 @@ class Skin:
     def stiffness_n_per_mm(self) -> float:
         """Sum of the stiffness of all layers."""
         return sum(one.stiffness_n_per_mm for one in self.membranes)
+
+    @property
+    def plane_stiffness_n_per_mm(self) -> float:
+        """Sum of N/(1 - ν²) of all layers: force per width and strain, held across."""
+        return sum(m.stiffness_n_per_mm / (1 - m.poissons_ratio**2) for m in self.membranes)
+
+    def scaled(self, factor: float) -> Skin:
+        """The skin with all layers stiffer by a factor > 0. Raises IfemError for another one."""
+        coat, fabric = (
+            None if m is None else replace(m, stiffness_n_per_mm=factor * m.stiffness_n_per_mm)
+            for m in (self.coat, self.fabric)
+        )
+        return replace(self, coat=coat, fabric=fabric)
 
     def to_record(self) -> dict[str, Any]:
         """Plain values, for `from_record`."""

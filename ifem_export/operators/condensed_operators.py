@@ -56,7 +56,7 @@ class PaperOperator(_WithCompliance):
         from ifem_export.operators.surface_kernel import apply_stencil
 
         u = checked_field(displacement_mm, self.system.columns)
-        if self.system.mesh.fill is not None:
+        if self._assembled:
             return np.asarray(self.system.stiffness @ u.ravel()).reshape(-1, 3)
         force = np.empty_like(u)
         apply_stencil(*self._stencil, np.vstack([u, np.zeros((1, 3))]), force)
@@ -64,10 +64,15 @@ class PaperOperator(_WithCompliance):
 
     @property
     def n_bytes(self) -> int:
-        """Bytes of the stencil, or of the matrix if cells are scaled."""
-        if self.system.mesh.fill is not None:
+        """Bytes of the stencil, or of the matrix where the stencil does not hold."""
+        if self._assembled:
             return matrix_bytes(self.system.stiffness)
         return int(sum(part.nbytes for part in self._stencil))
+
+    @property
+    def _assembled(self) -> bool:
+        """Whether cells are scaled or membranes added, which the stencil does not know."""
+        return self.system.mesh.fill is not None or bool(self.system.membranes)
 
     @cached_property
     def _stencil(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:

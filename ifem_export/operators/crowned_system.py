@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ifem_export.assembly.assembly import mesh_stiffness
+from ifem_export.elements.membrane import membrane_stiffness
+from ifem_export.elements.skin import Membrane
 from ifem_export.errors import MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.layered_operator import (
@@ -34,11 +36,16 @@ from ifem_export.operators.preconditioner import EmbeddedPreconditioner, mirrore
 Array = NDArray[np.float64]
 
 
-def pad_system(mesh: PadMesh, element_matrix: Array) -> PadSystem:
-    """Equations of a flat or a crowned pad. Raises MeshError for other uneven pads."""
+def pad_system(
+    mesh: PadMesh, element_matrix: Array, membranes: tuple[Membrane, ...] = ()
+) -> PadSystem:
+    """Equations of a flat or a crowned pad.
+
+    Raises MeshError for other uneven pads, and for membranes on a crowned one.
+    """
     if mesh.surface_shift is None:
-        return PadSystem(mesh, element_matrix)
-    return CrownedSystem(mesh, element_matrix)
+        return PadSystem(mesh, element_matrix, membranes)
+    return CrownedSystem(mesh, element_matrix, membranes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +55,8 @@ class CrownedSystem(PadSystem):
     def __post_init__(self) -> None:
         if self.mesh.surface_shift is None:
             raise MeshError("the pad is not crowned: it has no surface between nodes", field="mesh")
+        if self.membranes:
+            membrane_stiffness(self.mesh, self.membranes)
 
     @property
     def columns(self) -> int:

@@ -15,6 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ifem_export.assembly.assembly import corner_fill, mesh_stiffness
+from ifem_export.elements.membrane import (
+    membrane_blocks,
+    membrane_stiffness,
+    membrane_symbol,
+    with_skin,
+)
+from ifem_export.elements.skin import Membrane
 from ifem_export.errors import IfemError, MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.layer_elimination import LayerElimination, layer_elimination
@@ -46,6 +53,7 @@ class PadSystem:
     Attributes:
         mesh: The pad.
         element_matrix: (24, 24) in N/mm.
+        membranes: Coat and fabric on the surface, whose stiffness adds to that of the pad.
 
     Raises:
         MeshError: The pad is not of uniform thickness.
@@ -53,6 +61,7 @@ class PadSystem:
 
     mesh: PadMesh
     element_matrix: Array
+    membranes: tuple[Membrane, ...] = ()
 
     def __post_init__(self) -> None:
         cells = np.asarray(self.mesh.occupancy)
@@ -133,7 +142,10 @@ class PadSystem:
         It is that of all nodes: what needs no more than the inner block of a fine pad is spared
         the copy without the bonded nodes.
         """
-        return mesh_stiffness(self.mesh, np.asarray(self.element_matrix)), 3 * self.columns
+        pad = mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
+        if self.membranes:
+            pad = with_skin(pad, membrane_stiffness(self.mesh, self.membranes))
+        return pad, 3 * self.columns
 
     @property
     def _inner_size(self) -> int:
@@ -171,6 +183,9 @@ class PadSystem:
         return layer_elimination(*self._infinite, on_surface=on_surface)
 
     def _scaled(self, transform: Callable[[Array], Array]) -> Preconditioner:
+        if self.membranes and self.mesh.fill is None and transform is inverse:
+            size = self.mesh.cell_size_mm[:2]
+            return self.eliminated(lambda shape: membrane_symbol(size, self.membranes, shape))
         if self.mesh.fill is None and 18 * self.layers**2 * self.columns > MOST_BLOCK_BYTES:
             if transform is inverse:
                 return self.elimination
@@ -183,7 +198,17 @@ class PadSystem:
         return ScaledPreconditioner(uniform, weight[:-1] if inner else weight)
 
     def _operator(self, transform: Callable[[Blocks], Blocks]) -> LayeredOperator:
-        return layered_operator(*self._infinite, transform)
+        return layered_operator(*self._infinite, lambda blocks: transform(self._worn(blocks)))
+
+    def _worn(self, blocks: Blocks) -> Blocks:
+        """Stiffness blocks (ky, kx half, 3L, 3L) of the infinite pad with its membranes."""
+        if not self.membranes:
+            return blocks
+        shape = blocks.shape[0], 2 * (blocks.shape[1] - 1)
+        found = blocks.copy()
+        size = self.mesh.cell_size_mm[:2]
+        found[..., -3:, -3:] += membrane_blocks(size, self.membranes, shape)
+        return found
 
     @property
     def _infinite(self) -> tuple[Array, int, NDArray[np.int64], tuple[int, int]]:

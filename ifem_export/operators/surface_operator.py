@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
+from ifem_export.elements.skin import Membrane
 from ifem_export.errors import IfemError, MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.adjoint_fields import AdjointFields, adjoint_fields, use_stored
@@ -91,6 +92,7 @@ def surface_operator(
     radius: int = DEFAULT_RADIUS,
     lumped: bool | float = False,
     adjoint: AdjointFields | None = None,
+    membranes: tuple[Membrane, ...] = (),
 ) -> SurfaceOperator:
     """Make the surface operator of one rung for a flat or crowned pad.
 
@@ -106,6 +108,8 @@ def surface_operator(
         lumped: Whether "fft" is corrected at the rim, node by node, by what it misses of uniform
             motions; "truncated" always is.
         adjoint: Adjoint fields of this pad, where they are stored; else they are computed.
+        membranes: Coat and fabric on a flat pad. They add to the forces of the nodes; force and
+            torque of a motion do not depend on them.
 
     Returns:
         The operator. Force and torque of a motion are exact for all but "paper", whose single
@@ -114,7 +118,7 @@ def surface_operator(
     Raises:
         IfemError: The rung is unknown or the radius is below 1.
         MeshError: The pad is neither flat nor crowned, or it is crowned and the rung needs a
-            uniform thickness.
+            uniform thickness, or there are membranes on it.
     """
     if rung not in RUNGS:
         raise IfemError(
@@ -131,7 +135,8 @@ def surface_operator(
         )
     if rung == "paper":
         mesh, formulation = one_layer(mesh), "full"
-    system = pad_system(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
+    element = hex8_stiffness(mesh.cell_size_mm, material, formulation)
+    system = pad_system(mesh, element, membranes)
     if adjoint is not None and rung != "paper":
         use_stored(system, adjoint)
     return system_operator(system, rung, rtol=rtol, radius=radius, lumped=lumped)
