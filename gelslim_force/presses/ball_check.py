@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,19 +19,19 @@ _FREE_BALL = 0.3
 
 
 def fitted_ball(
-    view: PressView, models: Sequence[PressModel], loads: Sequence[Load], ratio_sigma: float = 0.0
+    view: PressView, models: Sequence[PressModel], loads: Sequence[Load], prior: GelPrior
 ) -> tuple[float, float]:
     """Diameter of the ball in mm, and its relative standard deviation, from markers and patches."""
-    free = fit_gel(view, models, loads, GelPrior(ratio_sigma, _FREE_BALL))
+    free = fit_gel(view, models, loads, replace(prior, ball_sigma=_FREE_BALL))
     sigma = float(np.hypot(np.sqrt(free.covariance[3, 3]), BALL_SIGMA))
     return 2 * view.ball_mm * float(np.exp(free.log_ball)), sigma
 
 
 def require_ball(
-    view: PressView, models: Sequence[PressModel], loads: Sequence[Load], ratio_sigma: float = 0.0
+    view: PressView, models: Sequence[PressModel], loads: Sequence[Load], prior: GelPrior
 ) -> None:
     """Raise PressError where the markers show a ball of another size than the one named."""
-    size, sigma = fitted_ball(view, models, loads, ratio_sigma)
+    size, sigma = fitted_ball(view, models, loads, prior)
     off = float(np.log(size / (2 * view.ball_mm)))
     if abs(off) > max(BALL_OFF, BALL_SIGMAS * sigma):
         raise PressError(

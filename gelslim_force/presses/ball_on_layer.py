@@ -6,7 +6,8 @@ The pressure p(r) under the ball has the transform p~(k) = ∫ p r J0(kr) dr = �
     w(r) = 2 (1 - ν²)/E ∫ L p~ J0(kr) dk,    u(r) = 2 (1 - ν²)/E ∫ M p~ J1(kr) dk,
 
 with the responses L, M and N of `layer_response`, which contain the skin. Under the ball
-w = depth - profile, which is a Fredholm equation of the second kind for χ (Lebedev and Ufliand 1958),
+w = depth - profile, which is a Fredholm equation of the second kind for χ (Lebedev and Ufliand
+1958),
 
     λ χ(t) + 1/π ∫ χ(s) (H(t-s) + H(t+s)) ds = E/(π (1-ν²)) (depth - t/2 ln((R+t)/(R-t))),
     H(v) = ∫ (L - λ) cos(kv) dk,

@@ -12,12 +12,14 @@ from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.light_baseline import ROBUST
 from gelslim_force.presses.ball_check import require_ball
 from gelslim_force.presses.gel_calibration import GelCalibration, designed_thickness_mm
-from gelslim_force.presses.gel_fit import (
-    FREE_RATIO_SIGMA,
-    FittedGel,
-    FittedPress,
-    GelPrior,
-    fit_gel,
+from gelslim_force.presses.gel_fit import FREE_RATIO_SIGMA, FittedGel, FittedPress, fit_gel
+from gelslim_force.presses.gel_skin import (
+    CONTRADICTS,
+    contradiction,
+    fit_known_skin,
+    free_skin,
+    skin_figure,
+    skin_slopes,
 )
 from gelslim_force.presses.load_table import Load
 from gelslim_force.presses.press_error import PressError
@@ -35,6 +37,8 @@ Picture = NDArray[np.uint8]
 LEAST_PRESSES = 3
 LAW_SIGMA = (0.01, 0.005)
 """Relative standard deviations of modulus and thickness by what the model does not have."""
+_GEL = [0, 1, 2, 4]
+"""ln modulus, ln thickness, Poisson's ratio and skin among the parameters of a fit."""
 _DEEP, _ALIKE, _CONTRADICTS, _MOVED_PX = 0.25, 1.3, 4.0, 0.15
 
 
@@ -48,8 +52,9 @@ def calibrate_gel(
     ball_mm: float,
     *,
     fit_ratio: bool = False,
+    fit_skin: bool = False,
 ) -> GelCalibration:
-    """Find Young's modulus and thickness of a built gel.
+    """Find Young's modulus and thickness of a built gel, and the stiffness of its skin if asked.
 
     Args:
         bundle: The sensor as designed.
@@ -61,6 +66,9 @@ def calibrate_gel(
         ball_mm: Diameter of the ball.
         fit_ratio: Also fit Poisson's ratio, about the value of the design with a standard
             deviation of 0.03.
+        fit_skin: Also fit the membrane stiffness of coat and fabric together. Otherwise it is that
+            of the design, none where the design has none, and a warning tells where the presses
+            contradict it.
 
     Returns:
         The gel with its covariance.
@@ -87,14 +95,16 @@ def calibrate_gel(
     models = [PressModel(view, view.look(p.picture, pictures[p.picture]), young) for p in pressed]
     tolerance = float(bundle.tolerances.get("poissons_ratio", 0.0))
     ratio_sigma = FREE_RATIO_SIGMA if fit_ratio else tolerance
-    require_ball(view, models, pressed, ratio_sigma)
-    found = fit_gel(view, models, pressed, GelPrior(ratio_sigma))
+    unknown = free_skin(view, ratio_sigma)
+    require_ball(view, models, pressed, unknown)
+    free = fit_gel(view, models, pressed, unknown)
+    found = free if fit_skin else fit_known_skin(view, models, pressed, ratio_sigma)
     moved = {
         load.picture: _moved_px(view, load.picture, pictures[load.picture])
         for load in loads
         if load.load_n == 0 and not np.array_equal(pictures[load.picture], reference)
     }
-    return _calibration(bundle, view, found, ball_mm, moved, ratio_sigma > 0)
+    return _calibration(view, found, free, ball_mm, moved, ratio_sigma > 0)
 
 
 def _moved_px(view: PressView, name: str, picture: Picture) -> float:
@@ -106,42 +116,64 @@ def _moved_px(view: PressView, name: str, picture: Picture) -> float:
 
 
 def _calibration(
-    bundle: Bundle,
     view: PressView,
     found: FittedGel,
+    free: FittedGel,
     ball_mm: float,
     moved_px: Mapping[str, float],
     ratio_known: bool,
 ) -> GelCalibration:
     trends = press_trends(found.presses, _stated_sigma(found.presses))
-    by_trends = np.diag([trends.modulus_sigma**2, 0.0, 0.0])
-    covariance = found.covariance[:3, :3] + np.diag([*np.square(LAW_SIGMA), 0.0]) + by_trends
-    if not ratio_known:
-        covariance[2] = covariance[:, 2] = 0.0
+    bundle, fitted = view.bundle, found is free
     gel, thickness = bundle.material, designed_thickness_mm(bundle)
+    skin = 0.0 if bundle.skin is None else bundle.skin.stiffness_n_per_mm
     design = {
         "youngs_modulus_mpa": gel.youngs_modulus_mpa,
         "thickness_mm": thickness,
         "poissons_ratio": gel.poissons_ratio,
+        **({"skin_n_per_mm": skin} if fitted or skin else {}),
     }
     made = GelCalibration(
         bundle.geometry_hash,
         float(np.exp(found.log_young)),
         thickness * float(np.exp(found.log_thickness)),
         found.poissons_ratio,
-        covariance,
+        _covariance(view, found, trends.modulus_sigma, ratio_known, fitted),
         design,
         ball_mm,
         tuple(_press_record(press) for press in found.presses),
+        skin_n_per_mm=skin_figure(view, found).n_per_mm if fitted else None,
     )
     sigma = _residual_sigma(found.presses)
-    lines = (*_diagnosis(made), *trends.lines(), *_returned(moved_px))
+    lines = (
+        *_diagnosis(made),
+        *_skin_lines(made, view, free),
+        *trends.lines(),
+        *_returned(moved_px),
+    )
     return GelCalibration(
         **{name: getattr(made, name) for name in made.__dataclass_fields__
            if name not in ("diagnosis", "warnings")},
         diagnosis=lines,
-        warnings=_warnings(made, view, found, sigma, moved_px),
+        warnings=(
+            *_skin_warnings(made, view, found, free),
+            *_warnings(made, view, found, sigma, moved_px),
+        ),
     )  # fmt: skip
+
+
+def _covariance(
+    view: PressView, found: FittedGel, trend_sigma: float, ratio_known: bool, with_skin: bool
+) -> Array:
+    """(3, 3) of ln modulus, ln thickness and Poisson's ratio, or (4, 4) with the skin in N/mm."""
+    covariance = found.covariance[np.ix_(_GEL, _GEL)].copy()
+    covariance[:2, :2] += np.diag(np.square(LAW_SIGMA)) + np.diag([trend_sigma**2, 0.0])
+    if not ratio_known:
+        covariance[2] = covariance[:, 2] = 0.0
+    if not with_skin:
+        return covariance[:3, :3]
+    to_stiffness = np.vstack([np.eye(4)[:3], skin_slopes(view, found)[_GEL]])
+    return np.asarray(to_stiffness @ covariance @ to_stiffness.T)
 
 
 def _stated_sigma(presses: Sequence[FittedPress]) -> Array:
@@ -191,6 +223,11 @@ def _diagnosis(made: GelCalibration) -> tuple[str, ...]:
         )
     else:
         lines.append(f"Poisson's ratio {made.poissons_ratio:g}, as designed; it was not fitted.")
+    if made.skin_n_per_mm is not None:
+        lines.append(
+            f"Membrane stiffness of the skin {made.skin_n_per_mm:.4f} ± {sigma[3]:.4f} N/mm, "
+            f"{design['skin_n_per_mm']:g} N/mm in the design."
+        )
     together = made.covariance[0, 1] / np.sqrt(made.covariance[0, 0] * made.covariance[1, 1])
     residual = np.sqrt(np.mean([press["residual_share"] ** 2 for press in made.presses]))
     lines.append(
@@ -198,6 +235,33 @@ def _diagnosis(made: GelCalibration) -> tuple[str, ...]:
         f"differ from the fitted forces by {residual:.1%} (root mean square)."
     )
     return tuple(lines)
+
+
+def _skin_lines(made: GelCalibration, view: PressView, free: FittedGel) -> tuple[str, ...]:
+    """What the presses tell of a skin that was not fitted."""
+    if made.skin_n_per_mm is not None:
+        return ()
+    seen = skin_figure(view, free)
+    return (
+        f"Membrane stiffness of the skin {made.design.get('skin_n_per_mm', 0.0):g} N/mm, as "
+        f"designed; it was not fitted. Fitted, it would be {seen.n_per_mm:.4f} ± "
+        f"{seen.sigma_n_per_mm:.4f} N/mm.",
+    )
+
+
+def _skin_warnings(
+    made: GelCalibration, view: PressView, found: FittedGel, free: FittedGel
+) -> tuple[str, ...]:
+    if made.skin_n_per_mm is not None or abs(contradiction(found, free)) < CONTRADICTS:
+        return ()
+    seen = skin_figure(view, free)
+    change = np.exp(np.array([free.log_young, free.log_thickness])
+                    - [found.log_young, found.log_thickness]) - 1  # fmt: skip
+    return (
+        f"the presses contradict a skin of {made.design.get('skin_n_per_mm', 0.0):g} N/mm: they "
+        f"show one of {seen.n_per_mm:.3f} ± {seen.sigma_n_per_mm:.3f} N/mm, with which modulus and "
+        f"thickness change by {change[0]:+.0%} and {change[1]:+.0%}; fit it with --fit-skin",
+    )
 
 
 def _returned(moved_px: Mapping[str, float]) -> tuple[str, ...]:

@@ -18,11 +18,12 @@ from gelslim_force.joint.settings import JointSettings
 from gelslim_force.presses.ball_check import fitted_ball, require_ball
 from gelslim_force.presses.ball_on_layer import BallOnLayer
 from gelslim_force.presses.gel_calibration import GelCalibration
-from gelslim_force.presses.gel_fit import FittedGel, GelPrior, fit_gel
+from gelslim_force.presses.gel_fit import FittedGel, fit_gel
+from gelslim_force.presses.gel_skin import known_skin
 from gelslim_force.presses.light_fit import FittedLight, PressLight, fit_light, press_light
 from gelslim_force.presses.load_table import Load
 from gelslim_force.presses.press_error import PressError
-from gelslim_force.presses.press_model import PressModel
+from gelslim_force.presses.press_model import PressModel, skin_length_mm
 from gelslim_force.presses.seen_press import PressView
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
@@ -91,12 +92,13 @@ def calibrate_light(
     view = PressView(*sensor, reference, ball_mm / 2)
     found = _placed(view, pictures)
     if fit_ball:
-        ball_mm, _ = fitted_ball(*found)
+        ball_mm, _ = fitted_ball(*found, known_skin(view))
         view = PressView(*sensor, reference, ball_mm / 2)
         found = _placed(view, pictures)
     else:
-        require_ball(*found)
-    fitted = fit_gel(*found, GelPrior(_ratio_sigma(bundle)))
+        require_ball(*found, known_skin(view))
+    prior = known_skin(view, _ratio_sigma(bundle))
+    fitted = fit_gel(*found, prior)
     traced = LightMap.from_arrays(bundle.light)
     lights, channels = _lights(view, reference, traced, pictures, fitted)
     law = LightLaw.of(traced, JointSettings().gamma)
@@ -166,6 +168,7 @@ def _lights(
             view.ball_mm * float(np.exp(gel.log_ball)),
             thickness,
             gel.poissons_ratio,
+            skin_mm=skin_length_mm(gel.skin, view.thickness_mm),
         )
         seen = bins.look(upright(image, calibration.camera), markers)
         lights.append(press_light(bins, seen, contact, press.place_mm))

@@ -1,4 +1,4 @@
-"""The gel of one built sensor: modulus, thickness and Poisson's ratio as presses show them.
+"""The gel of one built sensor: modulus, thickness, Poisson's ratio and skin as presses show them.
 
 Stored as JSON, format `gelslim-gel-calibration/1`.
 """
@@ -18,14 +18,16 @@ from gelslim_core.files.json_record import read_json_record, refusal
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.presses.press_error import PressError
+from ifem_export.elements.skin import restiffened
 
 if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
 FORMAT = "gelslim-gel-calibration/1"
-PARAMETERS = ("ln_youngs_modulus", "ln_thickness", "poissons_ratio")
-"""Order of the covariance."""
+PARAMETERS = ("ln_youngs_modulus", "ln_thickness", "poissons_ratio", "skin_n_per_mm")
+"""Order of the covariance; the last only where the skin was fitted."""
+_VALUES = ("youngs_modulus_mpa", "thickness_mm", "poissons_ratio", "skin_n_per_mm")
 _MAKE = "make it with `gelslim calibrate-gel BUNDLE PRESSES LOADS.csv --ball-mm D -o FILE`"
 _THICKNESS_RATIO = 0.5, 2.0
 
@@ -39,12 +41,15 @@ class GelCalibration:
         youngs_modulus_mpa: Young's modulus.
         thickness_mm: Thickness.
         poissons_ratio: Poisson's ratio.
-        covariance: (3, 3) of ln modulus, ln thickness and Poisson's ratio.
-        design: The same three as designed, by name.
+        covariance: (p, p) of ln modulus, ln thickness, Poisson's ratio and, where it was fitted, of
+            the skin: p = 3 or 4.
+        design: The same as designed, by name.
         ball_mm: Diameter of the ball that was pressed; None for a gel as specified.
         presses: What was found of each press, as plain data.
         diagnosis: What was found, in sentences.
         warnings: What should be looked at before the calibration is trusted.
+        skin_n_per_mm: Membrane stiffness of coat and fabric together, at least 0; None where it was
+            not fitted and is that of the design.
 
     Raises:
         ValueError: A value is impossible, or the covariance is none.
@@ -60,11 +65,13 @@ class GelCalibration:
     presses: tuple[Mapping[str, Any], ...] = ()
     diagnosis: tuple[str, ...] = field(default=())
     warnings: tuple[str, ...] = field(default=())
+    skin_n_per_mm: float | None = None
 
     def __post_init__(self) -> None:
         covariance = np.array(self.covariance, dtype=float)
-        if covariance.shape != (3, 3) or not np.isfinite(covariance).all():
-            raise ValueError("covariance must be 3 x 3 numbers")
+        size = len(self.parameters)
+        if covariance.shape != (size, size) or not np.isfinite(covariance).all():
+            raise ValueError(f"covariance must be {size} x {size} numbers")
         least = np.linalg.eigvalsh((covariance + covariance.T) / 2)[0]
         if not np.allclose(covariance, covariance.T, atol=1e-12) or least < -1e-12:
             raise ValueError("covariance must be symmetric and positive")
@@ -76,11 +83,19 @@ class GelCalibration:
                 raise ValueError(f"{name} = {value!r}: must be above 0")
         if not 0 <= self.poissons_ratio < 0.5:
             raise ValueError(f"poissons_ratio = {self.poissons_ratio!r}: must be in 0 ... 0.5")
+        if self.skin_n_per_mm is not None and not 0 <= self.skin_n_per_mm < np.inf:
+            raise ValueError(f"skin_n_per_mm = {self.skin_n_per_mm!r}: must be at least 0")
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names (p,) of what the covariance is of."""
+        return PARAMETERS[: 3 if self.skin_n_per_mm is None else 4]
 
     @property
     def standard_deviation(self) -> Array:
-        """(3,) of modulus in MPa, thickness in mm, and Poisson's ratio."""
-        scale = np.array([self.youngs_modulus_mpa, self.thickness_mm, 1.0])
+        """(p,) of modulus in MPa, thickness in mm, Poisson's ratio, and skin in N/mm."""
+        scale = np.array([self.youngs_modulus_mpa, self.thickness_mm, 1.0, 1.0])
+        scale = scale[: len(self.parameters)]
         return np.asarray(scale * np.sqrt(np.diag(self.covariance)))
 
     def applied(self, bundle: Bundle, calibration: Calibration) -> tuple[Bundle, Calibration]:
@@ -101,16 +116,24 @@ class GelCalibration:
         return made, replace(calibration, geometry_hash=made.geometry_hash)
 
     def varied(
-        self, bundle: Bundle, ln_thickness: float = 0.0, poissons_ratio: float = 0.0
+        self,
+        bundle: Bundle,
+        ln_thickness: float = 0.0,
+        poissons_ratio: float = 0.0,
+        skin_n_per_mm: float = 0.0,
     ) -> Bundle:
-        """The bundle with the gel as built and a change of two of its parameters."""
+        """The bundle with the gel as built and a change of its parameters."""
         gel = replace(
             bundle.material,
             youngs_modulus_mpa=self.youngs_modulus_mpa,
             poissons_ratio=self.poissons_ratio + poissons_ratio,
         )
         ratio = self.thickness_mm / designed_thickness_mm(bundle)
-        return bundle.with_gel(gel, ratio * float(np.exp(ln_thickness)))
+        made = bundle.with_gel(gel, ratio * float(np.exp(ln_thickness)))
+        if self.skin_n_per_mm is None:
+            return made
+        skin = restiffened(bundle.skin, max(self.skin_n_per_mm + skin_n_per_mm, 0.0))
+        return replace(made, skin=skin)
 
     def require_bundle(self, bundle: Bundle) -> None:
         """Raise PressError for another sensor, or an impossible thickness."""
@@ -158,20 +181,13 @@ def designed_thickness_mm(bundle: Bundle) -> float:
 
 def gel_calibration_record(found: GelCalibration) -> dict[str, Any]:
     """Return the calibration as numbers, strings, lists and dicts."""
+    names = _VALUES[: len(found.parameters)]
     return {
         "format": FORMAT,
         "geometry_hash": found.geometry_hash,
-        "youngs_modulus_mpa": found.youngs_modulus_mpa,
-        "thickness_mm": found.thickness_mm,
-        "poissons_ratio": found.poissons_ratio,
-        "standard_deviation": dict(
-            zip(
-                ("youngs_modulus_mpa", "thickness_mm", "poissons_ratio"),
-                found.standard_deviation.tolist(),
-                strict=True,
-            )
-        ),
-        "parameters": list(PARAMETERS),
+        **{name: getattr(found, name) for name in names},
+        "standard_deviation": dict(zip(names, found.standard_deviation.tolist(), strict=True)),
+        "parameters": list(found.parameters),
         "covariance": found.covariance.tolist(),
         "design": dict(found.design),
         "ball_mm": found.ball_mm,
@@ -217,8 +233,10 @@ def read_gel_calibration(path: str | os.PathLike[str]) -> GelCalibration:
 def _calibration_of(record: Mapping[str, Any]) -> GelCalibration:
     if record.get("format") != FORMAT:
         raise ValueError(f"its format is not {FORMAT}")
-    if tuple(record["parameters"]) != PARAMETERS:
-        raise ValueError(f"its parameters are not {', '.join(PARAMETERS)}")
+    skin = record.get("skin_n_per_mm")
+    expected = PARAMETERS[: 3 if skin is None else 4]
+    if tuple(record["parameters"]) != expected:
+        raise ValueError(f"its parameters are not {', '.join(expected)}")
     return GelCalibration(
         str(record["geometry_hash"]),
         float(record["youngs_modulus_mpa"]),
@@ -230,4 +248,5 @@ def _calibration_of(record: Mapping[str, Any]) -> GelCalibration:
         tuple(dict(press) for press in record["presses"]),
         tuple(str(line) for line in record["diagnosis"]),
         tuple(str(line) for line in record["warnings"]),
+        None if skin is None else float(skin),
     )

@@ -5,9 +5,9 @@ in the picture. Free are Young's modulus, thickness, Poisson's ratio and skin of
 the design knows, and of each press its radius of contact, place and friction. For one thickness the
 patch gives the depth, and the load then gives the modulus; presses of different size separate
 both, because the force of a thin layer grows faster with the patch than that of a thick one. The
-markers show the depth and the motion beside the ball, which tell the thickness without a load. A skin
-shows in the markers too: it prevents the motion aside, the more the smaller the patch, and hardly
-changes load and depth.
+markers show the depth and the motion beside the ball, which tell the thickness without a load. A
+skin shows in the markers too: it prevents the motion aside, the more the smaller the patch, and
+hardly changes load and depth.
 
 The errors that all presses have in common, such as that of the law by which the patch is found,
 are parameters of their own.

@@ -10,6 +10,7 @@ from gelslim_core.html_table import table_html
 from gelslim_force.presses.ball_on_layer import BallOnLayer
 from gelslim_force.presses.gel_calibration import GelCalibration
 from gelslim_force.presses.scatter_svg import Scatter, scatter_svg
+from ifem_export.elements.skin import Membrane
 
 STYLE = (
     "body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem}"
@@ -44,14 +45,20 @@ def sentence(text: str) -> str:
 
 def _force_against_patch(found: GelCalibration) -> Scatter:
     assert found.ball_mm is not None
+    skin = found.design.get("skin_n_per_mm", 0.0)
+    if found.skin_n_per_mm is not None:
+        skin = found.skin_n_per_mm
+    # Poisson's ratio of the skin hardly matters here.
+    skin_mm = Membrane(skin).plane_n_per_mm / found.youngs_modulus_mpa if skin else 0.0
     sizes = [float(press["contact_mm"]) for press in found.presses]
     curve = []
     for size in np.linspace(0.9 * min(sizes), 1.05 * max(sizes), _CURVE_POINTS):
         if size >= found.ball_mm / 2:
             break
         contact = BallOnLayer.at(
-            float(size), found.ball_mm / 2, found.thickness_mm, found.poissons_ratio
-        )
+            float(size), found.ball_mm / 2, found.thickness_mm, found.poissons_ratio,
+            skin_mm=skin_mm,
+        )  # fmt: skip
         curve.append((float(size), contact.force_n_per_mpa * found.youngs_modulus_mpa))
     return Scatter(
         sizes,
@@ -108,9 +115,10 @@ def _value_table(found: GelCalibration) -> str:
         ("Young's modulus, MPa", "youngs_modulus_mpa"),
         ("thickness, mm", "thickness_mm"),
         ("Poisson's ratio", "poissons_ratio"),
+        ("membrane stiffness of the skin, N/mm", "skin_n_per_mm"),
     )
     rows = [
         (title, f"{getattr(found, name):.4f}", f"{own:.4f}", f"{found.design[name]:.4f}")
-        for (title, name), own in zip(names, sigma, strict=True)
+        for (title, name), own in zip(names[: len(sigma)], sigma, strict=True)
     ]
     return table_html(("", "built", "standard deviation", "designed"), rows)

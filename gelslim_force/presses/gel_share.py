@@ -3,9 +3,11 @@
 The wrench is W = G S u. It is proportional to Young's modulus, so that its derivative by the
 logarithm of the modulus is W. The derivatives of G S by thickness and by Poisson's ratio are
 differences of the adjoint fields of two pads, computed once; where the normal motion follows from
-the size of a patch, it depends on the gel too, and its derivative adds G S du/dh. Where the forces
-follow from the markers alone, the source gives their derivatives (`joint.off_design`). A linear law
-leaves out a part of the force that grows with the depth (docs/physics.md, "Modulus").
+the size of a patch, it depends on the gel too, and its derivative adds G S du/dh. A skin has no
+part in G S, because its forces are in balance, but the normal motion depends on its stiffness over
+the modulus. Where the forces follow from the markers alone, the source gives their derivatives
+(`joint.off_design`). A linear law leaves out a part of the force that grows with the depth
+(docs/physics.md, "Modulus").
 """
 
 from __future__ import annotations
@@ -26,12 +28,16 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 LN_THICKNESS_STEP, RATIO_STEP = 0.02, 0.002
 """Changes for differences."""
+_SKIN_STEP, _LEAST_SKIN_STEP = 0.1, 0.02
+"""The same for the skin: a share of its stiffness, and of modulus times thickness."""
 _DEPTHS, _LEFT_OUT = (0.0, 0.1, 0.2, 0.3, 0.5), (0.0, 0.03, 0.11, 0.20, 0.47)
 """Depth of a ball over the thickness, and the share of its force that a linear law leaves out."""
 
 
 def varied_bundles(bundle: Bundle, gel: GelCalibration) -> list[tuple[Bundle, Bundle, float]]:
-    """Sensors with a thicker and a thinner gel, and those of another Poisson's ratio if it varies.
+    """Sensors with a thicker and a thinner gel, of another Poisson's ratio and in another skin.
+
+    The latter two only if they vary.
 
     Returns:
         For each parameter the sensor with less and with more of it, and the size of this step; none
@@ -44,7 +50,26 @@ def varied_bundles(bundle: Bundle, gel: GelCalibration) -> list[tuple[Bundle, Bu
     if gel.covariance[2, 2] > 0:
         step = min(RATIO_STEP, (0.5 - gel.poissons_ratio) / 2)
         found.append((gel.varied(bundle, 0.0, -step), gel.varied(bundle, 0.0, step), step))
+    if gel.skin_n_per_mm is not None:
+        least = _LEAST_SKIN_STEP * gel.youngs_modulus_mpa * gel.thickness_mm
+        step = _SKIN_STEP * gel.skin_n_per_mm + least
+        found.append((gel.varied(bundle), gel.varied(bundle, 0.0, 0.0, step), step))
     return found
+
+
+def varied_covariance(gel: GelCalibration, count: int) -> Array:
+    """Covariance (1 + count, 1 + count) of ln modulus and the parameters of `varied_bundles`.
+
+    The modulus changes at a constant ratio of skin and modulus, so that motions do not change.
+    """
+    size = len(gel.parameters)
+    by_ratio = np.eye(size)
+    if gel.skin_n_per_mm is not None:
+        by_ratio[3, 0] = -gel.skin_n_per_mm
+    covariance = by_ratio @ gel.covariance @ by_ratio.T
+    free = [0, 1, *([2] if gel.covariance[2, 2] > 0 else []), *([3] if size == 4 else [])]
+    used = free[: 1 + count]
+    return np.asarray(covariance[np.ix_(used, used)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +77,9 @@ class GelShare:
     """What an uncertain gel adds to the covariance of a wrench.
 
     Attributes:
-        covariance: (1 + p, 1 + p) of ln modulus, ln thickness and, where it varies, of Poisson's
-            ratio.
+        covariance: (1 + p, 1 + p) of ln modulus and of what `varied_bundles` varies.
         by_normal: (6, c) product G S for the normal motion.
-        derivative: (p, 6, c, 3) of G S by thickness and ratio.
+        derivative: (p, 6, c, 3) of G S by thickness, ratio and skin.
         linear_mm: Thickness of a gel whose law is taken to be linear; 0 for another law.
     """
 
@@ -74,14 +98,13 @@ class GelShare:
             law: Of the gel, as in `PipelineSettings`.
         """
         pairs = varied_bundles(bundle, gel)
-        size = 1 + len(pairs)
         shape = (len(pairs), 6, len(bundle.mesh.surface), 3)
         derivative = [
             (more.adjoint.forces - less.adjoint.forces) / (2 * step) for less, more, step in pairs
         ]
         by_normal = gel.varied(bundle).adjoint.forces[:, :, 2] if pairs else np.zeros(shape[1:3])
         linear_mm = designed_thickness_mm(bundle) if law == "linear" else 0.0
-        covariance = gel.covariance[:size, :size]
+        covariance = varied_covariance(gel, len(pairs))
         return cls(covariance, by_normal, np.reshape(derivative, shape), linear_mm)
 
     def added(
@@ -92,7 +115,7 @@ class GelShare:
         Args:
             wrench: With the covariance of everything else.
             displacement_mm: (c, 3) motion of the surface nodes; z is NaN where it is unknown.
-            reading: The normal motion, with its derivative by thickness and ratio where it
+            reading: The normal motion, with its derivatives by thickness, ratio and skin where it
                 depends on the gel, or that of its forces.
         """
         parts = self._by_gel(displacement_mm, reading)
@@ -103,7 +126,7 @@ class GelShare:
         return replace(wrench, covariance=total)
 
     def _by_gel(self, displacement_mm: Array, reading: NormalReading | None) -> Array:
-        """(p, 6) change of the wrench by thickness and ratio."""
+        """(p, 6) change of the wrench by thickness, ratio and skin."""
         if reading is not None and reading.forces is not None and reading.forces.by_gel is not None:
             return reading.forces.by_gel
         motion = np.nan_to_num(displacement_mm)

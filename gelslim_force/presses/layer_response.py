@@ -11,8 +11,8 @@ x = kh and κ = 3 - 4ν (L: Hannah 1951; Johnson, Contact Mechanics, 5.8; M and 
 solution in plane waves).
 
 A skin is a membrane of plane stiffness T = N_s/(1 - ν_s²), force per width over strain where the
-stretch across is held. Its equilibrium, q_gel = q + T (u'' + u'/r - u/r²), is q~ - T k² u~ in waves,
-so that the same equations hold with
+stretch across is held. By its equilibrium the gel gets q + T (u'' + u'/r - u/r²), q~ - T k² u~ in
+waves, so that the same equations hold with
 
     L' = L - s M²/(1 + s N),    M' = M/(1 + s N),    N' = N/(1 + s N),    s = C T k.
 """

@@ -164,30 +164,6 @@ class Bundle:
         """The bundle with its adjoint fields stored. Raises as `adjoint`."""
         return replace(self, stored_adjoint=self.adjoint.forces)
 
-    def with_skin(self, stiffness_n_per_mm: float) -> Bundle:
-        """The same sensor in a skin of another membrane stiffness.
-
-        Coat and fabric of the design keep their proportion; without any it is a coat.
-
-        Args:
-            stiffness_n_per_mm: Membrane stiffness of all layers together, >= 0.
-
-        Raises:
-            IfemError: The stiffness is negative or not finite.
-        """
-        layers = self.designed_skin
-        if stiffness_n_per_mm == 0:
-            bare = replace(layers, coat=None, fabric=None)
-            return replace(self, skin=None if bare.friction is None else bare)
-        return replace(self, skin=layers.scaled(stiffness_n_per_mm / layers.stiffness_n_per_mm))
-
-    @property
-    def designed_skin(self) -> Skin:
-        """The skin; a coat of 1 N/mm where the gel counts as bare."""
-        if self.skin is not None and self.skin.membranes:
-            return self.skin
-        return Skin(Membrane(1.0), friction=None if self.skin is None else self.skin.friction)
-
     def with_gel(self, material: Material, thickness_ratio: float = 1.0) -> Bundle:
         """The same sensor with a gel of another material and thickness.
 

@@ -40,6 +40,11 @@ class Membrane:
                 value=self.poissons_ratio,
             )
 
+    @property
+    def plane_n_per_mm(self) -> float:
+        """N/(1 - ν²): force per width and strain where the stretch across is held."""
+        return self.stiffness_n_per_mm / (1 - self.poissons_ratio**2)
+
 
 @dataclass(frozen=True)
 class Skin:
@@ -67,16 +72,8 @@ class Skin:
 
     @property
     def plane_stiffness_n_per_mm(self) -> float:
-        """Sum of N/(1 - ν²) of all layers: force per width and strain, held across."""
-        return sum(m.stiffness_n_per_mm / (1 - m.poissons_ratio**2) for m in self.membranes)
-
-    def scaled(self, factor: float) -> Skin:
-        """The skin with all layers stiffer by a factor > 0. Raises IfemError for another one."""
-        coat, fabric = (
-            None if m is None else replace(m, stiffness_n_per_mm=factor * m.stiffness_n_per_mm)
-            for m in (self.coat, self.fabric)
-        )
-        return replace(self, coat=coat, fabric=fabric)
+        """Sum of N/(1 - ν²) of all layers."""
+        return sum(one.plane_n_per_mm for one in self.membranes)
 
     def to_record(self) -> dict[str, Any]:
         """Plain values, for `from_record`."""
@@ -88,3 +85,34 @@ class Skin:
         layers = (record["coat"], record["fabric"])
         coat, fabric = (None if one is None else Membrane(**one) for one in layers)
         return cls(coat, fabric, record["friction"])
+
+
+def layers_of(skin: Skin | None) -> Skin:
+    """A skin with its layers; a coat of 1 N/mm where the gel counts as bare."""
+    if skin is not None and skin.membranes:
+        return skin
+    return Skin(Membrane(1.0), friction=None if skin is None else skin.friction)
+
+
+def restiffened(skin: Skin | None, stiffness_n_per_mm: float) -> Skin:
+    """The skin with another membrane stiffness of all layers together.
+
+    Coat and fabric keep their proportion; where there are none, it is a coat. Without stiffness
+    there are no layers.
+
+    Args:
+        skin: As designed; None for a bare gel.
+        stiffness_n_per_mm: At least 0.
+
+    Raises:
+        IfemError: The stiffness is negative or not finite.
+    """
+    layers = layers_of(skin)
+    if stiffness_n_per_mm == 0:
+        return replace(layers, coat=None, fabric=None)
+    factor = stiffness_n_per_mm / layers.stiffness_n_per_mm
+    coat, fabric = (
+        None if one is None else replace(one, stiffness_n_per_mm=factor * one.stiffness_n_per_mm)
+        for one in (layers.coat, layers.fabric)
+    )
+    return replace(layers, coat=coat, fabric=fabric)

@@ -49,6 +49,12 @@ def calibrate_gel(
     fit_ratio: Annotated[
         bool, typer.Option("--fit-ratio", help="Also fit Poisson's ratio.")
     ] = False,
+    fit_skin: Annotated[
+        bool,
+        typer.Option(
+            "--fit-skin", help="Also fit the membrane stiffness of the gel's coat and fabric."
+        ),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -64,9 +70,11 @@ def calibrate_gel(
 
     The size of the contact patch, the motion of the markers and the weight together give Young's
     modulus and the thickness of the gel with their covariance. Three presses are the least, five
-    of different weight are better. Prints the residual force of each press and what it does over
-    time. With -o it writes a file that `gelslim force --gel-calibration` takes, which then uses
-    the gel as built and adds its uncertainty to the standard deviations.
+    of different weight are better. With --fit-skin they also give the stiffness of a coat or a
+    fabric on the gel; without it a warning tells where the presses contradict the design's. Prints
+    the residual force of each press and what it does over time. With -o it writes a file that
+    `gelslim force --gel-calibration` takes, which then uses the gel as built and adds its
+    uncertainty to the standard deviations.
     """
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
@@ -83,7 +91,9 @@ def calibrate_gel(
     pictures = press_pictures(presses, [load.picture for load in listed])
     sensor = load_bundle(bundle)
     camera = read_calibration(calibration) if calibration else calibrate(sensor, rest)
-    found = calibrated(sensor, camera, rest, pictures, listed, ball_mm, fit_ratio=fit_ratio)
+    found = calibrated(
+        sensor, camera, rest, pictures, listed, ball_mm, fit_ratio=fit_ratio, fit_skin=fit_skin
+    )
     files.answer(
         gel_calibration_record(found),
         lambda: _describe(found, rest_name),
