@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 LN_THICKNESS_STEP, RATIO_STEP = 0.02, 0.002
 """Changes for differences."""
-_SKIN_STEP, _LEAST_SKIN_STEP = 0.1, 0.02
+_SKIN_STEP, _LEAST_SKIN_STEP = 0.03, 0.005
 """The same for the skin: a share of its stiffness, and of modulus times thickness."""
 _DEPTHS, _LEFT_OUT = (0.0, 0.1, 0.2, 0.3, 0.5), (0.0, 0.03, 0.11, 0.20, 0.47)
 """Depth of a ball over the thickness, and the share of its force that a linear law leaves out."""

@@ -157,7 +157,7 @@ class TruthGel:
     @cached_property
     def compliance(self) -> SurfaceCompliance:
         """Surface compliance of the finer pad in its skin."""
-        return SurfaceCompliance(truth_pad(self.sensor), self.folder, self.sensor.bundle.membranes)
+        return SurfaceCompliance(truth_pad(self.sensor), self.folder, self.sensor.membranes)
 
     @property
     def law(self) -> Law:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from contact_pads import YOUNGS_MPA, dense_compliance, small_pad
@@ -13,11 +15,12 @@ from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.compliance.convolved import ConvolvedCompliance
 from ifem_export.elements.material import Material
 from ifem_export.elements.membrane import membrane_stiffness
-from ifem_export.elements.skin import Membrane, Skin
+from ifem_export.elements.skin import Membrane, Skin, restiffened
 from ifem_export.errors import IfemError, MeshError
 from ifem_export.mesh.crown import Paraboloid
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.surface_operator import Rung
 
 Array = NDArray[np.float64]
 COAT, FABRIC = Membrane(0.04, 0.45), Membrane(0.3, 0.2)
@@ -137,3 +140,77 @@ def test_no_skin_on_a_crown() -> None:
     with pytest.raises(MeshError) as caught:
         membrane_stiffness(mesh, (FABRIC,))
     assert caught.value.field == "mesh"
+
+
+EXACT: tuple[tuple[Rung, float], ...] = (
+    ("factor", 1e-9), ("pcg", 1e-4), ("dense32", 1e-5), ("paper", 1e-9),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("rung", "close"), EXACT)
+def test_operators_contain_the_skin_of_a_bundle(rung: Rung, close: float) -> None:
+    """The forces of the bare operator and those of the membranes, and back."""
+    pad = replace(small_pad(0.45, 10, 2, 8.0), skin=Skin(COAT, FABRIC))
+    motion = np.random.default_rng(1).standard_normal((len(pad.mesh.surface), 3))
+    own = (membrane_stiffness(pad.mesh, pad.membranes) @ motion.ravel()).reshape(-1, 3)
+    expected = own + pad.surface_operator(rung, membranes=()).force(motion)
+    operator = pad.surface_operator(rung)
+    force = operator.force(motion)
+    np.testing.assert_allclose(force, expected, atol=close * np.abs(own).max())
+    np.testing.assert_allclose(operator.displacement(force), motion, atol=max(close, 1e-6) * 4)
+
+
+def test_convolutions_contain_the_skin_within_the_pad() -> None:
+    """On a smooth bump in the middle, which no edge sees."""
+    pad = replace(small_pad(0.45, 24, 2, 14.0), skin=Skin(FABRIC))
+    x, y = np.asarray(pad.mesh.surface_mm)[:, :2].T
+    motion = np.zeros((len(x), 3))
+    motion[:, 0] = (x + 0.5 * y) * np.exp(-(x**2 + y**2) / 4)
+    motion[:, 1] = y * np.exp(-(x**2 + y**2) / 4)
+    exact = pad.surface_operator("factor")
+    force = exact.force(motion)
+    bare = pad.surface_operator("factor", membranes=()).force(motion)
+    assert np.abs(force - bare).max() > 0.3 * np.abs(force).max()
+    for rung, close in (("fft", 0.02), ("truncated", 0.05)):
+        found = pad.surface_operator(rung).force(motion)
+        np.testing.assert_allclose(found, force, atol=close * np.abs(force).max())
+    moved = pad.surface_operator("fft", lumped=1).displacement(force)
+    np.testing.assert_allclose(moved, motion, atol=0.02 * np.abs(motion).max())
+
+
+def test_force_and_torque_of_a_motion_do_not_know_the_skin() -> None:
+    pad = small_pad(0.45, 10, 2, 8.0)
+    worn = replace(pad, skin=Skin(COAT, FABRIC))
+    motion = np.random.default_rng(2).standard_normal((len(pad.mesh.surface), 3))
+    points = np.asarray(pad.mesh.surface_mm)
+    force = worn.surface_operator("factor").force(motion)
+    found = np.concatenate([force.sum(axis=0), np.cross(points, force).sum(axis=0)])
+    np.testing.assert_allclose(found, pad.adjoint.wrench(motion), atol=1e-9)
+    np.testing.assert_allclose(found, worn.adjoint.wrench(motion), atol=1e-9)
+
+
+def test_a_crowned_pad_counts_as_bare() -> None:
+    mesh, _ = build_pad_mesh(
+        RoundedRectangle(8.0, 8.0, 1.0), 2.0, cells=(8, 8, 2), crown=Paraboloid(0.4, 9.0)
+    )
+    pad = replace(bundle_of(mesh), skin=Skin(FABRIC))
+    assert pad.membranes == ()
+    with pytest.raises(MeshError) as caught:
+        pad.surface_operator("pcg", membranes=(FABRIC,))
+    assert caught.value.field == "mesh"
+
+
+def test_another_stiffness_keeps_the_proportion_of_the_layers() -> None:
+    skin = restiffened(Skin(COAT, FABRIC, 0.6), 0.17)
+    assert skin.stiffness_n_per_mm == pytest.approx(0.17)
+    assert skin.coat is not None
+    assert skin.fabric is not None
+    assert skin.fabric.stiffness_n_per_mm / skin.coat.stiffness_n_per_mm == pytest.approx(
+        0.3 / 0.04
+    )
+    assert skin.plane_stiffness_n_per_mm == pytest.approx(0.02 / (1 - 0.45**2) + 0.15 / (1 - 0.04))
+    assert skin.friction == 0.6
+    assert restiffened(None, 0.2).membranes == (Membrane(0.2),)
+    assert restiffened(Skin(COAT), 0.0).membranes == ()
+    with pytest.raises(IfemError):
+        restiffened(None, -0.1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bonded_layer import layer_contact
-from pressed_disc import pressed_disc, surface_stiffness
+from pressed_disc import SKIN_RATIO, membrane_stiffness, pressed_disc, surface_stiffness
 from scipy.optimize import brentq
 
 from gelslim_force.presses.ball_on_layer import BallOnLayer
@@ -65,13 +65,19 @@ def test_motion_agrees_with_finite_elements(ratio: float) -> None:
 
 
 @pytest.mark.parametrize("ratio", [0.3223, 0.48])
-@pytest.mark.parametrize("friction", [(-0.3, 0.0), (0.1, -0.3)])
-def test_friction_agrees_with_finite_elements(ratio: float, friction: tuple[float, float]) -> None:
+@pytest.mark.parametrize(
+    ("friction", "skin"), [((-0.3, 0.0), 0.0), ((0.1, -0.3), 0.0), ((0.1, -0.3), 0.3)]
+)
+def test_friction_agrees_with_finite_elements(
+    ratio: float, friction: tuple[float, float], skin: float
+) -> None:
     """The tractions of the solution, put on the elements, give its motion and fit the ball."""
     contact, ball, thickness = 2.0, 6.0, 2.0
-    smooth = BallOnLayer.at(contact, ball, thickness, ratio)
-    found = BallOnLayer.at(contact, ball, thickness, ratio, friction)
+    plane = skin / (1 - SKIN_RATIO**2)
+    smooth = BallOnLayer.at(contact, ball, thickness, ratio, skin_mm=plane)
+    found = BallOnLayer.at(contact, ball, thickness, ratio, friction, plane)
     r, stiffness = surface_stiffness(thickness, ratio)
+    stiffness[0::2, 0::2] += membrane_stiffness(r, skin)
     force = np.zeros(2 * len(r))
     x, weight = np.polynomial.legendre.leggauss(12)
     for cell in range(0, int(np.searchsorted(r, contact)), 2):
