@@ -19,10 +19,13 @@ _FREE_BALL = 0.3
 
 
 def fitted_ball(
-    view: PressView, models: Sequence[PressModel], loads: Sequence[Load], prior: GelPrior
+    view: PressView,
+    models: Sequence[PressModel],
+    loads: Sequence[Load],
+    prior: GelPrior | None = None,
 ) -> tuple[float, float]:
     """Diameter of the ball in mm, and its relative standard deviation, from markers and patches."""
-    free = fit_gel(view, models, loads, replace(prior, ball_sigma=_FREE_BALL))
+    free = fit_gel(view, models, loads, replace(prior or GelPrior(), ball_sigma=_FREE_BALL))
     sigma = float(np.hypot(np.sqrt(free.covariance[3, 3]), BALL_SIGMA))
     return 2 * view.ball_mm * float(np.exp(free.log_ball)), sigma
 
