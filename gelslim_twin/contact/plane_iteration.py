@@ -73,6 +73,8 @@ BALANCE, OFF, MOST_OFF = 0.5, 0.1, 1e-2
 ROUNDING_MM = 1e-8
 """Smallest gap tolerance, by the accuracy of slopes from differences."""
 FINER, FINEST = 0.1, 1e-4
+ONE_NORMAL = 1e-9
+"""Difference of unit normals that is rounding."""
 LOOSE, AHEAD = 0.1, 0.1
 """Inexact solves: tolerance of the first one, and then the share of the last relative gap."""
 
@@ -146,7 +148,9 @@ class PlaneIteration:
         offset, missing, fine = self.offset_mm, 0.0, BALANCE * self.tolerance
         if self.correction is not None:
             offset = self.correction.first_mm(force_n)
-        sweeps, worst, inner_tolerance = 0, np.inf, max(fine, LOOSE)
+        sweeps, worst = 0, np.inf
+        # Planes of a flat tool do not turn, so that loose forces would only be solved again.
+        inner_tolerance = FINER * fine if self._is_flat(surface) else max(fine, LOOSE)
         for turn in range(GEOMETRY_STEPS):
             balance = self._balance(shape, u, offset, force, inner_tolerance, known)
             sweeps += balance.sweeps
@@ -206,6 +210,11 @@ class PlaneIteration:
             frames,
             known,
         )
+
+    def _is_flat(self, surface: ToolSurface) -> bool:
+        """Whether the nodes that may be in contact have one normal."""
+        normal = surface.normal[self.wanted & surface.is_met]
+        return not len(normal) or bool(np.ptp(normal, axis=0).max() < ONE_NORMAL)
 
     def _worst(self, gap: Array, balance: ContactForces) -> float:
         off = np.where(balance.touch > 0, gap, np.minimum(gap, 0.0))
