@@ -85,6 +85,11 @@ def test_a_built_gel_is_found_and_used(sensor: Path, tmp_path: Path, capsys) -> 
     assert record["thickness_mm"] == pytest.approx(2.1, rel=0.03)
     assert run(sensor, "--json") == 0
     assert json.loads(capsys.readouterr().out)["reference"] == "a_rest.png"
+    assert run(sensor, "--fit-skin", "--json") == 0
+    worn = json.loads(capsys.readouterr().out)
+    assert worn["skin_n_per_mm"] < 0.01
+    assert worn["parameters"][-1] == "skin_n_per_mm"
+    assert len(worn["covariance"]) == 4
     assert run(sensor, ball="20") == 2
     assert "fit a ball of 1" in capsys.readouterr().err
 
