@@ -177,9 +177,9 @@ class ShadingReference:
         if len(self.used) < 2:
             return np.zeros(self.shape, dtype=bool)
         seen = self._counts > 0
-        brightest = np.where(seen, self._ratios[self.used].max(axis=0), 1.0)
+        brightest = self._ratios[self.used].max(axis=0)
         usual = np.median(brightest[seen & self.on_pad]) if (seen & self.on_pad).any() else 1.0
-        dark = brightest < _OPAQUE * usual
+        dark = seen & (brightest < _OPAQUE * usual)
         return np.asarray(binary_dilation(dark, np.ones((3, 3)))) if dark.any() else dark
 
 
