@@ -17,10 +17,10 @@ from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import NormalReading, NormalSource
 from gelslim_force.forces import frame_problems
 from gelslim_force.forces.contact_motion import ContactMotion
-from gelslim_force.forces.finite_strain import law_of
 from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.forces.frame_problems import FrameCheck
 from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.gel_law import GelLaw
 from gelslim_force.forces.untouched import untouched, with_untouched
 from gelslim_force.forces.wrench import WrenchNoise
 from gelslim_force.forces.wrench_covariance import WrenchCovariance
@@ -126,9 +126,9 @@ class ForcePipeline:
         return self._forces.direct.operator.name
 
     @property
-    def gel_law(self) -> str:
-        """Law of the gel in use: `linear` where `auto` finds no neo-Hookean one for this pad."""
-        return law_of(self.bundle, self.settings.gel)
+    def gel_law(self) -> GelLaw:
+        """Law of the gel, and why it is not the one of the settings if it is another."""
+        return GelLaw.of(self.bundle, self.settings.gel, depth_seen=self.normal is not None)
 
     def with_normal(self, normal: NormalSource | None) -> ForcePipeline:
         """A pipeline of the same sensor with another normal source, at rest.
@@ -245,7 +245,12 @@ class ForcePipeline:
             normal_known=known,
             stage_ms=clock.stages,
             problems=problems,
-            extra={**seen, **field.summary(), **self._drift.findings(drift)},
+            extra={
+                **seen,
+                **field.summary(),
+                "gel": self.gel_law.at(field.displacement_mm),
+                **self._drift.findings(drift),
+            },
             **found,
         )
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.gel_law import GelUse
 from gelslim_force.frames.frame import Frame
 from gelslim_force.frames.upright import upright
 from gelslim_force.pipeline import ForcePipeline
@@ -46,6 +47,8 @@ class RunSummary:
     """Those first problems by their words without numbers."""
     least_coverage: float = 1.0
     largest_force_n: float = 0.0
+    gel: GelUse = field(default_factory=GelUse)
+    """Frames with forces by the law of the gel."""
     last: FrameResult | None = None
     stage_ms: dict[str, deque[float]] = field(default_factory=dict)
     """Times of the last frames by stage."""
@@ -66,6 +69,8 @@ class RunSummary:
             self.least_coverage = min(self.least_coverage, result.coverage)
         if result.wrench is not None:
             self.with_forces += 1
+            if "gel" in result.extra:
+                self.gel.add(result.extra["gel"])
             size = float(np.sqrt(np.nansum(result.wrench.force_n**2)))
             self.largest_force_n = max(self.largest_force_n, size)
 

@@ -66,7 +66,8 @@ def result_sinks(
     overlay = _overlay(pipeline)
     sinks: list[Any] = []
     if outputs.mcap is not None:
-        sinks.append(_recording(stack, outputs.mcap, identity, outputs.overwrite))
+        about = identity | _law_record(pipeline)
+        sinks.append(_recording(stack, outputs.mcap, about, outputs.overwrite))
     if outputs.rerun is not None:
         sinks.append(_rerun_log(stack, outputs, outputs.rerun, pipeline))
     if outputs.video is not None:
@@ -276,6 +277,7 @@ def answer_json(
         {
             "folder": str(folder),
             "operator": pipeline.operator_name,
+            "gel": {**pipeline.gel_law.record(), "frames": plain(summary.gel)},
             "frames": summary.frames,
             "frames_dropped": summary.dropped,
             "frames_with_forces": summary.with_forces,
@@ -301,6 +303,8 @@ def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures:
     say(f"{summary.frames} frames, {summary.with_forces} with forces, by {by}.")
     if summary.dropped:
         say(f"{summary.dropped} frames of the camera were dropped for newer ones.")
+    for line in summary.gel.sentences(pipeline.gel_law):
+        say(line)
     wrench = summary.last.wrench if summary.last is not None else None
     if wrench is not None:
         say(f"Last frame: {wrench}.")
@@ -316,6 +320,12 @@ def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures:
         say(f"Not known of this sensor: {line}", style="yellow")
     say(f"Run in {folder}/" + (f", {len(pictures)} pictures in {folder}/pictures/" if pictures
                                else ""))  # fmt: skip
+
+
+def _law_record(pipeline: ForcePipeline) -> dict[str, str]:
+    """The law of the gel as metadata of a recording, which are texts."""
+    record = pipeline.gel_law.record()
+    return {f"gel_{name}": "" if value is None else str(value) for name, value in record.items()}
 
 
 def _missing(pipeline: ForcePipeline) -> tuple[str, ...]:

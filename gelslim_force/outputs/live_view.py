@@ -207,6 +207,7 @@ def live_state(result: FrameResult) -> dict[str, Any]:
     return {
         "frame": numbers,
         "wrench": wrench.lines(),
+        "gel": plain(result.extra.get("gel")),
         "problems": list(result.problems),
         "stage_ms": stages,
     }

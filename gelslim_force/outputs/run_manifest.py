@@ -14,6 +14,7 @@ from typing import Any, Literal
 from gelslim_core.errors import OutputError, disk_error
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.gel_law import GelUse
 from gelslim_force.forces.record import plain
 from ifem_export.bundle.bundle import Bundle
 
@@ -48,6 +49,8 @@ class RunCounts:
     last_time_s: float | None = None
     first_stamp_s: float | None = None
     last_stamp_s: float | None = None
+    gel: GelUse = field(default_factory=GelUse)
+    """Frames with forces by the law of the gel."""
     problems: dict[str, int] = field(default_factory=dict)
     """Number of frames by problem; beyond `_MAX_PROBLEMS` different ones they count as "other"."""
 
@@ -58,6 +61,8 @@ class RunCounts:
         self.with_field += result.field is not None
         self.with_wrench += result.wrench is not None
         self.with_problems += bool(result.problems)
+        if result.wrench is not None and "gel" in result.extra:
+            self.gel.add(result.extra["gel"])
         if self.first_time_s is None:
             self.first_time_s = plain(float(result.time_s))
         self.last_time_s = plain(float(result.time_s))

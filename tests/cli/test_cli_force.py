@@ -45,6 +45,11 @@ def test_run_folder_and_answer(sensor: Path, tmp_path: Path, capsys) -> None:
     assert run(sensor, "-o", str(tmp_path / "run"), "--pictures", "2", "--json") == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["frames"] == answer["frames_with_forces"] == 5
+    frames = {"linear": 5, "neo_hookean": 0, "deep_linear": 0}
+    gel = {"asked": "linear", "law": "linear", "fallback": None, "frames": frames}
+    assert answer["gel"] == gel
+    settings = read_run(tmp_path / "run").manifest["settings"]
+    assert (settings["gel_law"], settings["gel_fallback"]) == ("linear", None)
     assert len(answer["pictures"]) == 2
     assert all(Path(p).stat().st_size > 10_000 for p in answer["pictures"])
     recorded = read_run(tmp_path / "run")
@@ -122,7 +127,9 @@ def test_video_and_recording(sensor: Path, tmp_path: Path, capsys) -> None:
     given = ("-o", str(tmp_path / "run"), "--video", str(tmp_path / "v.mp4"))
     assert run(sensor, *given, "--mcap", str(tmp_path / "r.mcap"), "--pictures", "0") == 0
     assert (tmp_path / "v.mp4").stat().st_size > 1000
-    assert (tmp_path / "r.mcap").stat().st_size > 1000
+    with open(tmp_path / "r.mcap", "rb") as stream:
+        (about,) = pytest.importorskip("mcap.reader").make_reader(stream).iter_metadata()
+    assert about.metadata["gel_law"] == about.metadata["gel_asked"] == "linear"
     recorded = read_run(tmp_path / "run")
     assert len(recorded.wrenches["index"]) == 5
 

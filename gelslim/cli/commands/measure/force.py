@@ -124,6 +124,7 @@ def force(
             "calibration": str(calibration) if calibration else None,
             "gel_calibration": str(gel_calibration) if gel_calibration else None,
             "light_calibration": str(light_calibration) if light_calibration else None,
+            "gel_law": pipeline.gel_law.law, "gel_fallback": pipeline.gel_law.fallback or None,
         }  # fmt: skip
         summary, drawn = _run(pipeline, source, most_frames, outputs, manifest)
     say = answer_json if as_json else report
