@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 from deep_contacts import deep_case
-from deep_pictures import deep_bundle, deep_calibration, deep_picture
+from deep_pictures import Light, deep_bundle, deep_calibration, deep_picture
 from numpy.typing import NDArray
 from pressed_samples import Pressed, reference
 from sigma_cases import seen
@@ -47,8 +47,8 @@ class DeepScore:
 
 
 @cache
-def _pipeline(designed_ratio: float, law: str) -> ForcePipeline:
-    bundle, calibration = deep_bundle(designed_ratio), deep_calibration()
+def _pipeline(designed_ratio: float, law: str, light: Light) -> ForcePipeline:
+    bundle, calibration = deep_bundle(designed_ratio, light), deep_calibration()
     settings = PipelineSettings(gel=law)  # type: ignore[arg-type]
     share = built_gel(bundle, calibration, None, settings).share
     picture, linear = reference().image, JointSettings(gamma=1.0)
@@ -56,13 +56,14 @@ def _pipeline(designed_ratio: float, law: str) -> ForcePipeline:
     return ForcePipeline(bundle, calibration, settings, source, share)
 
 
-def deep_scores(law: str, seeds: Iterable[int]) -> tuple[DeepScore, ...]:
+def deep_scores(law: str, seeds: Iterable[int], light: Light = "guided") -> tuple[DeepScore, ...]:
     """Of the contacts of some seeds, each in one of the conditions, which take turns."""
-    return tuple(_score(law, seed) for seed in seeds)
+    return tuple(_score(law, seed, light) for seed in seeds)
 
 
-def _score(law: str, seed: int) -> DeepScore:
-    pipeline, truth = _pipeline(deep_case(seed).designed_ratio, law), deep_picture(seed)
+def _score(law: str, seed: int, light: Light) -> DeepScore:
+    pipeline = _pipeline(deep_case(seed).designed_ratio, law, light)
+    truth = deep_picture(seed, light)
     pipeline.reset()
     return _compared(seed, pipeline.process(seen(truth.image, condition_of(seed), seed)), truth)
 

@@ -8,6 +8,7 @@ and so were thickness and Poisson's ratio when the contacts were solved.
 from __future__ import annotations
 
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from camera_rig import off_centre_view
@@ -21,20 +22,26 @@ from sensor_samples import sensor_bundle, sensor_grid
 from shaded_frames import lines_of_sight, shaded
 from sigma_cases import LIGHT_GAIN, MODULUS_SIGMA, with_tolerances
 from synthetic import moved_rims
+from traced_light import traced_bundle, traced_irradiance
 
 from gelslim_force.calibration.sensor_calibration import Calibration
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.operators.ladder import lumped
 
 Array = NDArray[np.float64]
+Light = Literal["guided", "traced", "one direction"]
+"""What the bundle knows of the light: the directions that are drawn; those of another trace than
+the one that is drawn; or of such a trace the mean directions alone."""
 CELL_MM, HALF_MM = 0.1, (12.0, 11.3)
 _ROUNDS = 8
 
 
 @cache
-def deep_bundle(designed_ratio: float) -> Bundle:
+def deep_bundle(designed_ratio: float, light: Light = "guided") -> Bundle:
     """The sensor as designed, with the tolerances of its gel."""
-    return with_tolerances(guided_bundle(designed_ratio))
+    if light == "guided":
+        return with_tolerances(guided_bundle(designed_ratio))
+    return with_tolerances(traced_bundle(designed_ratio, fans=light == "traced"))
 
 
 def deep_calibration() -> Calibration:
@@ -42,7 +49,7 @@ def deep_calibration() -> Calibration:
     return calibration()
 
 
-def deep_picture(seed: int) -> Pressed:
+def deep_picture(seed: int, light: Light = "guided") -> Pressed:
     """A stored contact as a camera without noise sees it, with forces for the modulus drawn."""
     rng = np.random.default_rng([42, seed])
     young, gain = np.exp(rng.normal(0, (MODULUS_SIGMA, LIGHT_GAIN)))
@@ -54,7 +61,7 @@ def deep_picture(seed: int) -> Pressed:
         return np.column_stack([s.ev(*places_mm.T) for s in splines])
 
     frame = shaded(
-        change=_change(contact, splines).reshape(480, 640, 3),
+        change=_change(contact, splines, light).reshape(480, 640, 3),
         noise=0.0,
         moved_mm=moved_rims(motion, sensor_grid()),
         camera=off_centre_view(),
@@ -68,7 +75,7 @@ def deep_picture(seed: int) -> Pressed:
     return Pressed(frame.image, on_nodes, wrench, motion(nodes))
 
 
-def _change(contact: DeepContact, splines: list[RectBivariateSpline]) -> Array:
+def _change(contact: DeepContact, splines: list[RectBivariateSpline], light: Light) -> Array:
     """Light (n, 3) over that of the level surface at what the pixels see."""
     axes = [np.arange(-half, half + CELL_MM / 2, CELL_MM) for half in HALF_MM]
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=2)
@@ -78,12 +85,13 @@ def _change(contact: DeepContact, splines: list[RectBivariateSpline]) -> Array:
         material = flat - np.column_stack([s.ev(*material.T) for s in splines[:2]])
     height = splines[2].ev(*material.T).reshape(shape)
     slope_x, slope_y = np.gradient(height, CELL_MM)
-    light = irradiance(height, (slope_x, slope_y), CELL_MM)
+    drawn = irradiance if light == "guided" else traced_irradiance
+    lit = drawn(height, (slope_x, slope_y), CELL_MM)
     rest, lean = lines_of_sight(off_centre_view())
     low = np.array([axis[0] for axis in axes])
     seen = rest.copy()
     for _ in range(_ROUNDS):  # where the lines of sight meet the deformed surface
         seen = rest + lean * map_coordinates(height, ((seen - low) / CELL_MM).T, order=1)[:, None]
     at = ((seen - low) / CELL_MM).T
-    channels = [map_coordinates(light[:, :, k], at, order=1, mode="nearest") for k in range(3)]
+    channels = [map_coordinates(lit[:, :, k], at, order=1, mode="nearest") for k in range(3)]
     return np.column_stack(channels)

@@ -56,22 +56,22 @@ def irradiance(height_mm: Array, slope: tuple[Array, Array], cell_mm: float) -> 
             way = np.array([c * travel[0] - s * travel[1], s * travel[0] + c * travel[1]])
             steepness = float(np.tan(np.radians(elevation)))
             rise = (way[0] * slope[0] + way[1] * slope[1]) / steepness
-            reached = _reached(height_mm, way, steepness, cell_mm)
-            direct += share * np.maximum(1 - rise, 0) * reached
+            open_to = reached(height_mm, way, steepness, cell_mm)
+            direct += share * np.maximum(1 - rise, 0) * open_to
         channels.append(AMBIENT_SHARE + (1 - AMBIENT_SHARE) * direct / area)
     return np.stack(channels, axis=2)
 
 
-def _reached(height_mm: Array, way: Array, steepness: float, cell_mm: float) -> Array:
+def reached(height_mm: Array, way: Array, steepness: float, cell_mm: float) -> Array:
     """Whether (nx, ny) light that travels along `way` and rises by `steepness` reaches a place."""
     row, column = np.indices(height_mm.shape).astype(float)
-    reached = np.ones(height_mm.shape)
+    found = np.ones(height_mm.shape)
     farthest = float(np.ptp(height_mm)) / steepness
     for back in np.arange(_MARCH_MM, farthest, _MARCH_MM):
         at = [row - way[0] * back / cell_mm, column - way[1] * back / cell_mm]
         before = map_coordinates(height_mm, at, order=1, mode="nearest")
-        reached[before < height_mm - back * steepness] = 0.0
-    return reached
+        found[before < height_mm - back * steepness] = 0.0
+    return found
 
 
 def guided_bundle(poissons_ratio: float) -> Bundle:

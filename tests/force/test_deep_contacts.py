@@ -2,7 +2,8 @@
 
 The truth is a pad of half the pitch and five layers with contact and friction at large strain; see
 `deep_contacts`. The pictures have strained dots, light from a range of directions with cast
-shadows, noise, dirt or drift, and gel and light off design; see `deep_pictures`.
+shadows, noise, dirt or drift, and gel and light off design; see `deep_pictures`. One test draws
+light whose directions the bundle does not have.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import pytest
 from camera_rig import off_centre_view
 from deep_contacts import COUNT, KINDS, SEEN, deep_case, deep_contact, finer_pad, solve
 from deep_gate import deep_scores, deep_summary
+from deep_pictures import Light
 from numpy.typing import NDArray
 from sigma_gate import summaries
 from synthetic import centroids, grid_of_dots, moved_rims, outlines
@@ -82,6 +84,28 @@ def test_forces_at_large_strain(
         assert reached["shear"] < shear
         assert reached["centre_mm"] < 0.1
         assert reached["field"] < field
+    for summary in summaries(s.score for s in some):
+        assert 0.5 < summary.rms < 1.3
+        assert summary.covered > 0.85
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("light", ["traced", "one direction"])
+def test_forces_in_light_whose_directions_the_bundle_has_not(light: Light) -> None:
+    """LEDs off their places, another trace, 44 directions of each side that are no bins of it.
+
+    The bundle has the coarse bins of its own trace, or mean directions alone.
+    """
+    some = deep_scores("auto", range(0, COUNT, 3), light)
+    assert all(s.score.error_n for s in some), [s.score.problem for s in some]
+    reached = deep_summary(some)
+    assert reached["contacts"] == 16
+    assert reached["normal"] < 0.05
+    assert abs(reached["bias"]) < 0.05
+    assert reached["normal_95"] < 0.12
+    assert reached["shear"] < 0.01
+    assert reached["centre_mm"] < 0.1
+    assert reached["field"] < 0.22
     for summary in summaries(s.score for s in some):
         assert 0.5 < summary.rms < 1.3
         assert summary.covered > 0.85

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from guided_light import AMBIENT_SHARE, FANS, guided_bundle, irradiance, sensitivity
+from traced_light import AROUND, directions, traced_bundle, traced_irradiance
+from traced_light import sensitivity as traced_sensitivity
+from traced_light import traced as traced_sums
 
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
@@ -48,3 +51,25 @@ def test_a_wall_casts_a_shadow_as_long_as_its_height_over_the_tangent() -> None:
         assert near[0] < far[0] - 0.02
     assert light[22, 0] < AMBIENT_SHARE + 0.2 * (1 - AMBIENT_SHARE)
     np.testing.assert_allclose(light[30:, 1], 1.0)  # the light along -y sees no wall
+
+
+def test_drawn_directions_are_the_traced_light_and_no_bins_of_the_bundle() -> None:
+    """Facets are lit as by all traced directions; small slopes count as in the bundle's trace."""
+    level = np.zeros((1, 1))
+    for sums, drawn, source in zip(traced_sums(fine=True), directions(), (0, 1), strict=True):
+        assert drawn[:, 0].sum() == pytest.approx(1)
+        bundle = LightMap.from_arrays(traced_bundle(0.45, fans=True).light)
+        own = bundle.light_fans.sums[source, 0, 0]
+        lit = own[own[:, 0] > 0]
+        ways = lit[:, 1:] / lit[:, :1]
+        apart = np.hypot(*np.moveaxis(drawn[:, None, 1:] - ways, 2, 0)).min(axis=1)
+        assert len(drawn) % AROUND == 0
+        assert (apart > 1e-3).mean() > 0.9
+        for rise in (-1.2, -0.4, 0.4, 1.2):
+            every = np.maximum(sums[:, 0] - rise * sums[:, 2], 0).sum() / np.hypot(1, rise)
+            expected = AMBIENT_SHARE + (1 - AMBIENT_SHARE) * every
+            slope = level, level + rise
+            found = traced_irradiance(level, slope, CELL_MM)[0, 0, source]
+            assert found == pytest.approx(expected, abs=0.03)
+    fine, coarse = (traced_sensitivity(traced_sums(fine=f)) for f in (True, False))
+    np.testing.assert_allclose(fine, coarse, atol=0.02)
