@@ -105,9 +105,9 @@ class GelUse:
         if self.deep_linear:
             remedy = "" if gel.fallback else "; give --gel auto"
             found.append(
-                f"In {_frames(self.deep_linear)} the contact is deeper than {deep}, where the linear "
-                f"law gives too little normal force: 4 % there, 15 % at 38 % of the thickness; the "
-                f"stated deviation holds this{remedy}."
+                f"In {_frames(self.deep_linear)} the contact is deeper than {deep}, where the "
+                f"linear law gives too little normal force, for a ball 4 % there and 15 % at 38 % "
+                f"of the thickness; the stated deviation holds this{remedy}."
             )
         return tuple(found)
 
