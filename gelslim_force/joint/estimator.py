@@ -25,7 +25,7 @@ from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointF
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows, rms_length
-from gelslim_force.joint.model_errors import at_edge, by_region, edge_nodes
+from gelslim_force.joint.model_errors import at_edge, by_heights, by_region, edge_nodes
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
@@ -320,8 +320,13 @@ class JointEstimator:
         spread = state.equations.spread_of(sums, state.force_n[nodes].ravel())
         covariance = at_edge(state.force_n, self.points_mm, self._near_edge, self.settings)
         by_gel, markers = None, state.markers
+        by_marker = markers.response(spread, self.markers.mm_per_px)
         if self.off_design is None:
             covariance += spread @ sums.T - markers.overstated(spread)
+            height = self.nodes_to_markers @ state.displacement_mm[:, 2]
+            apparent = self.settings.height_share * self.by_height * height[:, None]
+            apparent *= min(-float(height.min(initial=0.0)) / self.deep_mm, 1.0)
+            covariance += by_heights(by_marker, self.markers.mm_per_px, apparent)
         else:
             force = state.force_n[nodes]
             covariance += scaled_covariance(
@@ -331,18 +336,9 @@ class JointEstimator:
             covariance += self.off_design.by_camera(markers, spread, state.displacement_mm[:, 2])
             by_gel = self.off_design.by_parameter(markers, spread, nodes, force)
         return JointForces(
-            state.force_n,
-            state.displacement_mm,
-            region,
-            seen,
-            covariance,
-            markers.response(spread, self.markers.mm_per_px),
-            by_gel,
-            state.gain,
-            state.unexplained,
-            self._shown(frame.seen),
-            state.motion,
-        )
+            state.force_n, state.displacement_mm, region, seen, covariance, by_marker, by_gel,
+            state.gain, state.unexplained, self._shown(frame.seen), state.motion,
+        )  # fmt: skip
 
     def _shown(self, seen: SeenLight | None) -> Mask:
         if self.light is None or seen is None:

@@ -37,6 +37,22 @@ def at_edge(force_n: Array, points_mm: Array, near: Mask, settings: JointSetting
     return np.asarray(size**2 * along.T @ along)
 
 
+def by_heights(by_marker: Array, mm_per_px: Array, apparent_mm: Array) -> Array:
+    """(6, 6) by an error of the heights that all markers in a dent have in common.
+
+    The camera looks at the gel at an angle, so that markers at wrong heights seem to have moved
+    aside, all to the same side: a shear without a force.
+
+    Args:
+        by_marker: (6, n, 2) change of the wrench per px by which a marker is seen elsewhere.
+        mm_per_px: (n, 2, 2) of the markers.
+        apparent_mm: (n, 2) lateral motion that the picture shows of a standard deviation of theirs.
+    """
+    seen_px = np.linalg.solve(mm_per_px, apparent_mm[:, :, None])[:, :, 0]
+    change = np.einsum("anj,nj->a", by_marker, seen_px)
+    return np.outer(change, change)
+
+
 def by_region(rigid: Array, force_n: Array, wider_n: Array | None) -> Array:
     """(6, 6) by a region that is not known better than its last change.
 

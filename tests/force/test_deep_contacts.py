@@ -85,8 +85,8 @@ def test_forces_at_large_strain(
         assert reached["centre_mm"] < 0.1
         assert reached["field"] < field
     for summary in summaries(s.score for s in some):
-        assert 0.5 < summary.rms < 1.3
-        assert summary.covered > 0.85
+        assert 0.5 < summary.rms < (1.3 if law == "linear" else 1.2)
+        assert summary.covered > 0.9
 
 
 @pytest.mark.slow
