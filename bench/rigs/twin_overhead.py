@@ -100,6 +100,7 @@ class ByHand:
         replace_file(out / "truth.csv", wrench_csv(truths, points))
         replace_file(out / "truth.npz", fields_npz(truths, points, scene.observe))
         replace_file(out / "run.json", json_bytes({"frames": len(truths)}))
+        shutil.rmtree(out / "states")
 
 
 def overhead(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ FORMAT = "gelslim-simulation/1"
 RUN, PLAN, LEDGER = "run.json", "plan.json", "ledger.json"
 TRUTH, FIELDS = "truth.csv", "truth.npz"
 FRAMES, STATES = "frames", "states"
+_STATE_FILES = "states_*.npz"
 
 
 class SimulationError(GelslimError, ValueError):
@@ -50,8 +52,9 @@ class RunFolder:
                         "folder or replace it with --force"
                     )
                 found.clear()
-            (path / FRAMES).mkdir(exist_ok=True)
-            (path / STATES).mkdir(exist_ok=True)
+            if not found.complete:
+                (path / FRAMES).mkdir(exist_ok=True)
+                (path / STATES).mkdir(exist_ok=True)
             for folder in (path, path / FRAMES, path / STATES):
                 sweep(folder, again=True)
         except OSError as error:
@@ -89,6 +92,13 @@ class RunFolder:
         """Rewrite run.json."""
         self.write(RUN, json_bytes({"format": FORMAT, "key": self.key, "state": state, **about}))
 
+    def remove_states(self) -> None:
+        """Delete the solved poses, from which only an unfinished simulation continues."""
+        for file in (self.path / STATES).glob(_STATE_FILES):
+            file.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # a file of the user's may be in it
+            (self.path / STATES).rmdir()
+
     def frame_path(self, number: int) -> Path:
         """Picture of a frame."""
         return self.path / FRAMES / f"frame_{number:06d}.png"
@@ -97,9 +107,9 @@ class RunFolder:
         """Delete the files of a simulation."""
         for name in (RUN, PLAN, LEDGER, TRUTH, FIELDS):
             (self.path / name).unlink(missing_ok=True)
-        for pattern in (f"{FRAMES}/frame_*.png", f"{STATES}/states_*.npz"):
-            for file in self.path.glob(pattern):
-                file.unlink()
+        self.remove_states()
+        for file in self.path.glob(f"{FRAMES}/frame_*.png"):
+            file.unlink()
 
 
 def simulation_key(scene_record: str, plan_json: str, geometry_hash: str, material: str) -> str:

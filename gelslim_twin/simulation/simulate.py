@@ -118,7 +118,8 @@ def simulate(
     """Simulate a scene into a folder.
 
     Writes plan.json, truth.csv, truth.npz, frames/ where pictures are observed, ledger.json and,
-    last, run.json with the state "complete". A complete folder is left as it is.
+    last, run.json with the state "complete". The solved poses in states/, from which an
+    interrupted run continues, are then deleted. A complete folder is left as it is.
 
     Args:
         job: Scene, plan and sensor, for example from `job_of`.
@@ -155,6 +156,7 @@ def _simulated(job: SimulationJob, folder: Path, overwrite: bool, tell: Progress
     about = {"scene": job.scene.name, "observe": list(job.scene.observe), "seed": job.scene.seed}
     ledger = Ledger()
     if run.complete:
+        run.remove_states()
         ledger.frames_kept = len(frame_times(job.poses, job.scene.camera.frame_rate_hz))
         return ledger
     run.mark("running", about)
@@ -166,6 +168,7 @@ def _simulated(job: SimulationJob, folder: Path, overwrite: bool, tell: Progress
     run.write(FIELDS, fields_npz(truths, points, job.scene.observe))
     run.write(LEDGER, json_bytes(ledger.to_record()))
     run.mark("complete", {**about, "frames": len(truths), "poses": len(job.poses)})
+    run.remove_states()
     return ledger
 
 

@@ -41,6 +41,7 @@ def test_folder_says_what_happened(simulated: Path) -> None:
     ledger = json.loads((simulated / "ledger.json").read_text())
     assert ledger["poses_solved"] == ledger["frames_drawn"] == 10
     assert ledger["solver_worst"]["penetration_mm"] < 1e-3
+    assert not (simulated / "states").exists()
 
 
 def test_table_is_the_sum_of_the_fields(simulated: Path) -> None:
@@ -98,6 +99,9 @@ def test_again_keeps_everything_and_another_scene_is_refused(
     place: Path, simulated: Path, capsys
 ) -> None:
     before = digests(simulated)
+    (simulated / "states").mkdir()
+    # As after a kill just before they were deleted.
+    (simulated / "states" / "states_00000.npz").write_bytes(b"left")
     assert main(["simulate", str(place / "scene.yaml"), "-o", str(simulated), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert (answer["poses_solved"], answer["frames_drawn"]) == (0, 0)
@@ -126,12 +130,17 @@ def test_a_killed_run_goes_on_to_the_same_bytes(place: Path, simulated: Path) ->
     assert digests(folder) == digests(simulated)
 
 
-@pytest.mark.slow
-def test_a_data_set_is_the_same_by_one_process_or_two(place: Path) -> None:
+def varied_scene(place: Path) -> Path:
     scene = place / "varied.yaml"
     text = (place / "scene.yaml").read_text()
     text = text.replace("steps: 4", "steps: 2").replace("steps: 3", "steps: 1")
     scene.write_text(text + "vary: {depth_factor: [0.5, 1.2], direction_deg: [-180, 180]}\n")
+    return scene
+
+
+@pytest.mark.slow
+def test_a_data_set_is_the_same_by_one_process_or_two(place: Path) -> None:
+    scene = varied_scene(place)
     for name, jobs in (("one", "1"), ("two", "2")):
         out = place / "out" / name
         assert main(["simulate", str(scene), "-o", str(out), "--count", "3", "-j", jobs]) == 0
@@ -142,18 +151,17 @@ def test_a_data_set_is_the_same_by_one_process_or_two(place: Path) -> None:
     assert len(set(pictures)) == len(pictures) == 3 * 6 + 1
 
 
+@pytest.mark.slow
 def test_a_cluster_does_the_same(place: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    scene = place / "varied.yaml"
-    if not (place / "out" / "one").exists():
-        pytest.skip("needs the data set of the test before")
-    out = place / "out" / "cluster"
+    scene, out, here = varied_scene(place), place / "out" / "cluster", place / "out" / "here"
+    assert main(["simulate", str(scene), "-o", str(here), "--count", "3"]) == 0
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
     ) as cluster:
         given = ["--count", "3", "--scheduler", cluster.scheduler_address]
         assert main(["simulate", str(scene), "-o", str(out), *given]) == 0
-    assert digests(out) == digests(place / "out" / "one")
+    assert digests(out) == digests(here)
 
 
 def test_another_gel_or_camera_replaces_the_stored_sensor(place: Path, tmp_path: Path) -> None:
