@@ -42,9 +42,9 @@ from gelslim_twin.datasets.job import FORMAT, DataSetJob
 from gelslim_twin.datasets.labels import MEANING
 from gelslim_twin.datasets.making import compute_compliance
 from gelslim_twin.datasets.sample import SPLITS
-from gelslim_twin.datasets.sensor_files import SENSORS, write_sensors
-from gelslim_twin.datasets.shard_task import WORK, ShardTask, moved, perform
-from gelslim_twin.datasets.splits import shards
+from gelslim_twin.datasets.sensor_files import SENSORS, are_written, write_sensors
+from gelslim_twin.datasets.shard_task import WORK, Tasks, moved, perform
+from gelslim_twin.datasets.splits import Shards
 from gelslim_twin.scene.pose import frame_times
 
 HERE = Engine()
@@ -100,7 +100,7 @@ def _made(
     _open(job, count, overwrite)
     about = description(job, count)
     wanted = all_shards(job, count)
-    missing = [shard for shard in wanted if not _is_done(job, shard)]
+    missing = [number for number, shard in enumerate(wanted) if not _is_done(job, shard)]
     before = manifest(folder)
     if before.get("state") == "complete" and before["count"] == count and not missing:
         return before
@@ -108,11 +108,15 @@ def _made(
     replace_file(folder / PLAN, job.plan.to_json().encode())
     tell("sensors", 0, 1)
     compute_compliance(job)
-    write_sensors(job)
-    done = sum(len(s.samples) for s in wanted) - sum(len(s.samples) for s in missing)
+    # A worker prepares the sensors for its samples, so that their files cost it little.
+    elsewhere = len(missing) > 1 and not are_written(job)
+    if not elsewhere:
+        write_sensors(job)
+    tasks = Tasks(job, wanted, missing, about, sensors=elsewhere)
+    done = count - sum(tasks.samples(number) for number in range(len(tasks)))
     tell("samples", done, count)
-    for number, _ in engine.run(perform, [ShardTask(job, s, about) for s in missing]):
-        done += len(missing[number].samples)
+    for number, _ in engine.run(perform, tasks):
+        done += tasks.samples(number)
         tell("samples", done, count)
     _remove_surplus(folder, wanted)
     write_index(folder, [s.name for s in wanted])
@@ -169,14 +173,14 @@ def _remove(folder: Path) -> None:
             Path(place).rmdir()
 
 
-def all_shards(job: DataSetJob, count: int) -> list[Shard]:
+def all_shards(job: DataSetJob, count: int) -> Shards:
     """The shards of a data set with `count` samples."""
     poses = job.loaded.poses
     even = not job.loaded.scene.vary.motions
     rate = job.loaded.scene.camera.frame_rate_hz
     kept = len(job.frames.of(len(frame_times(poses, rate))))
     size = max(1, job.frames_per_shard // kept)
-    return shards(
+    return Shards(
         split_numbers(job, count), size, job.pictures, kept if even else None, kept_rate_hz(job)
     )
 

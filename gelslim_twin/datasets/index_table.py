@@ -21,6 +21,8 @@ from gelslim_twin.datasets.sample import Sample, Value
 INDEX, RECORDS = "index.parquet", "shards"
 PURPOSE = "the index of a data set"
 _META = b"gelslim"
+BATCH_ROWS = 1024
+"""Rows of the index that are in memory at one time."""
 MOST_REASONS = 10
 """Records that are searched for reasons."""
 
@@ -198,8 +200,8 @@ def write_index(dataset: Path, names: Sequence[str]) -> None:
         writer.close()
 
 
-def index_rows(dataset: Path) -> Iterator[dict[str, Any]]:
-    """The rows of the index, one row group after the other.
+def index_rows(dataset: Path, columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
+    """The rows of the index one after the other, all columns or those named.
 
     Raises:
         DataSetError: There is no index that can be read.
@@ -210,7 +212,7 @@ def index_rows(dataset: Path) -> Iterator[dict[str, Any]]:
     except (OSError, ValueError) as error:
         raise DataSetError(f"{dataset / INDEX}: cannot be read ({error}); make it again") from error
     with source:
-        for batch in source.iter_batches():
+        for batch in source.iter_batches(BATCH_ROWS, columns=columns):
             yield from batch.to_pylist()
 
 
@@ -221,11 +223,3 @@ def index_schema(dataset: Path) -> list[str]:
         return [f"{field.name} ({field.type})" for field in parquet.read_schema(dataset / INDEX)]
     except (OSError, ValueError) as error:
         raise DataSetError(f"{dataset / INDEX}: cannot be read ({error}); make it again") from error
-
-
-def index_ids(dataset: Path) -> Iterator[str]:
-    """The ids of the samples of the index, one for each frame."""
-    parquet = load("pyarrow.parquet", PURPOSE)
-    with parquet.ParquetFile(dataset / INDEX) as source:
-        for batch in source.iter_batches(columns=["id"]):
-            yield from batch.column(0).to_pylist()

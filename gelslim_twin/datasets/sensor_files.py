@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,15 @@ from gelslim_twin.scene.draw import Drawn, sensor_values
 SENSORS = "sensors"
 
 
+def are_written(job: DataSetJob) -> bool:
+    """Whether the files of all sensors are there."""
+    return all(_place(job, built.number).with_suffix(".npz").is_file() for built in job.sensors)
+
+
+def _place(job: DataSetJob, number: int) -> Path:
+    return job.out_folder / SENSORS / f"sensor_{number:02d}"
+
+
 def write_sensors(job: DataSetJob) -> None:
     """Write `sensors/sensor_00.npz` and, where pictures are observed, `sensors/sensor_00.png`.
 
@@ -26,7 +36,7 @@ def write_sensors(job: DataSetJob) -> None:
     """
     maker = maker_of(job)
     for built in job.sensors:
-        path = job.out_folder / SENSORS / f"sensor_{built.number:02d}"
+        path = _place(job, built.number)
         if path.with_suffix(".npz").is_file():
             continue
         prepared = maker.prepared(built.number)

@@ -1,14 +1,17 @@
-"""One shard as a task: its samples are made and written, its files hashed and moved in place."""
+"""The tasks of a data set: the files of its sensors, and one shard after the other.
+
+The samples of a shard are made and written, its files hashed and moved in place.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from gelslim_core.yaml.errors import InputError
 from gelslim_twin.datasets.formats import Shard, format_named
@@ -22,6 +25,7 @@ from gelslim_twin.datasets.index_table import (
 from gelslim_twin.datasets.job import DataSetJob
 from gelslim_twin.datasets.making import maker_of
 from gelslim_twin.datasets.sample import Sample, Value
+from gelslim_twin.datasets.sensor_files import write_sensors
 from ifem_export.errors import IfemError
 from ifem_export.operators.single_thread import single_threaded
 
@@ -43,12 +47,72 @@ class ShardTask:
     about: Mapping[str, Any]
 
 
+@dataclass(frozen=True)
+class SensorTask:
+    """The files of the built sensors, which a worker prepares for its samples anyway."""
+
+    job: DataSetJob
+
+
+Task = ShardTask | SensorTask
+
+
+class Tasks(Sequence[Task]):
+    """The tasks of a data set, each made when it is asked for, so that none takes memory before."""
+
+    def __init__(
+        self,
+        job: DataSetJob,
+        shards: Sequence[Shard],
+        missing: Sequence[int],
+        about: Mapping[str, Any],
+        *,
+        sensors: bool,
+    ) -> None:
+        """Take what the tasks have in common.
+
+        Args:
+            job: The data set.
+            shards: All its shards.
+            missing: Places of the shards to make among these.
+            about: What `dataset.json` says of the data set.
+            sensors: Whether the first task writes the files of the sensors.
+        """
+        self._job, self._shards, self._missing, self._about = job, shards, missing, about
+        self._before = int(sensors)
+
+    def __len__(self) -> int:
+        """Number of tasks."""
+        return self._before + len(self._missing)
+
+    @overload
+    def __getitem__(self, index: int) -> Task: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Task]: ...
+    def __getitem__(self, index: int | slice) -> Task | list[Task]:
+        """A task by its place."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        if index < self._before:
+            return SensorTask(self._job)
+        shard = self._shards[self._missing[index - self._before]]
+        return ShardTask(self._job, shard, self._about)
+
+    def samples(self, index: int) -> int:
+        """Samples of a task, those that cannot be made included."""
+        if index < self._before:
+            return 0
+        return len(self._shards[self._missing[index - self._before]].samples)
+
+
 @single_threaded
-def perform(task: ShardTask) -> dict[str, Any]:
-    """Make a shard. The files are the same on every worker.
+def perform(task: Task) -> dict[str, Any]:
+    """Carry out a task. The files are the same on every worker.
 
     Samples whose contact is not solved, or that leave the limits of the scene, are left out and
-    listed in the record.
+    listed in the record of their shard.
 
     Returns:
         Counts of samples, frames and failures.
@@ -56,7 +120,10 @@ def perform(task: ShardTask) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1, user_api="blas"):
-        return _performed(task)
+        if isinstance(task, ShardTask):
+            return _performed(task)
+        write_sensors(task.job)
+        return {"samples": 0, "frames": 0, "failed": 0}
 
 
 def _performed(task: ShardTask) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,27 +89,55 @@ def division(given: variation.Split, names: Sequence[str], seed: int) -> Divisio
     return Division(seed, "tool", tuple(found.get(name, "train") for name in names))
 
 
-def shards(
-    splits: NDArray[np.int8],
-    size: int,
-    pictures: Pictures,
-    frames_per_sample: int | None,
-    frame_rate_hz: float | None,
-) -> list[Shard]:
+class Shards(Sequence[Shard]):
     """Shards of consecutive samples, split after split.
 
-    Args:
-        splits: Number of the split of each sample, an index of `SPLITS`.
-        size: Samples per shard.
-        pictures: Encoding of the pictures.
-        frames_per_sample: Frames of each sample; None where it differs.
-        frame_rate_hz: Frames per second; None where their times are not even.
+    Only the numbers of the samples are held, in four bytes each; a shard is made when it is asked
+    for.
     """
-    found, first = [], 0
-    for index, split in enumerate(SPLITS):
-        numbers = np.flatnonzero(splits == index)
-        for k, start in enumerate(range(0, len(numbers), size)):
-            mine = tuple(numbers[start : start + size].tolist())
-            found.append(Shard(split, k, first, mine, pictures, frames_per_sample, frame_rate_hz))
-            first += len(mine)
-    return found
+
+    def __init__(
+        self,
+        splits: NDArray[np.int8],
+        size: int,
+        pictures: Pictures,
+        frames_per_sample: int | None,
+        frame_rate_hz: float | None,
+    ) -> None:
+        """Divide the samples.
+
+        Args:
+            splits: Number of the split of each sample, an index of `SPLITS`.
+            size: Samples per shard.
+            pictures: Encoding of the pictures.
+            frames_per_sample: Frames of each sample; None where it differs.
+            frame_rate_hz: Frames per second; None where their times are not even.
+        """
+        # Stable, so that the numbers ascend within a split.
+        self._numbers = np.argsort(splits, kind="stable").astype(np.int32)
+        self._size = size
+        self._same = pictures, frames_per_sample, frame_rate_hz
+        samples = np.bincount(splits, minlength=len(SPLITS))
+        self._starts = np.concatenate([[0], np.cumsum(samples)])
+        self._shards = np.concatenate([[0], np.cumsum(-(-samples // size))])
+
+    def __len__(self) -> int:
+        """Number of shards."""
+        return int(self._shards[-1])
+
+    @overload
+    def __getitem__(self, index: int) -> Shard: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Shard]: ...
+    def __getitem__(self, index: int | slice) -> Shard | list[Shard]:
+        """A shard by its place in the data set."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        split = int(np.searchsorted(self._shards, index, side="right")) - 1
+        number = index - int(self._shards[split])
+        first = int(self._starts[split]) + number * self._size
+        end = min(first + self._size, int(self._starts[split + 1]))
+        samples = tuple(self._numbers[first:end].tolist())
+        return Shard(SPLITS[split], number, first, samples, *self._same)

@@ -78,7 +78,7 @@ def _compared(folder: Path, about: dict[str, Any], frames: dict[str, int]) -> li
     split_of_tool: dict[str, str] = {}
     by_tool = "by sample" not in about["tools"].values()
     found, samples, before = [], 0, None
-    for row in index_rows(folder):
+    for row in index_rows(folder, ("id", "shard", "split", "tool")):
         rows[row["shard"]] += 1
         if row["id"] != before:
             samples, before = samples + 1, row["id"]

@@ -82,30 +82,42 @@ def complete(
     Raises:
         DataSetError: No shard holds a sample, or shards have different columns.
     """
-    written = list(_written(dataset, shards))
-    if not written:
-        raise DataSetError(f"{dataset}: no sample was solved, so there is nothing to describe")
-    features = written[0].features
-    for other in written:
-        alike = (other.features, frame_rate_hz(other.shard))
-        if alike != (features, frame_rate_hz(written[0].shard)):
-            raise DataSetError(
-                f"{dataset}: shard {other.shard.name} has other columns or another frame rate than "
-                f"{written[0].shard.name}; write both with the same scene"
-            )
-    task = task_of(about)
-    for shard in written:
+    first: WrittenShard | None = None
+    schema: Any = None
+    for shard in _written(dataset, shards):
+        first = first or shard
+        _require_alike(dataset, first, shard)
+        found = _episode_rows(shard, task_of(about)).schema
+        # A column without any value in a shard takes its type from the others.
+        both = [found] if schema is None else [schema, found]
+        schema = arrow().unify_schemas(both, promote_options="permissive")
         _renumber(folder, dataset, shard)
-    episodes = arrow().concat_tables(
-        [_episode_rows(w, task) for w in written], promote_options="permissive"
-    )
-    tables = ((places.EPISODES_PATH, episodes), (places.TASKS_PATH, tasks_table([task])))
-    for place, table in tables:
-        with parquet_writer(folder / place, table.schema) as file:
-            file.write_table(table)
-    info = _info(written, {**features, **counter_features()})
-    (folder / places.INFO_PATH).write_bytes(json_bytes(info))
-    (folder / places.STATS_PATH).write_bytes(json_bytes(_statistics(episodes, features)))
+    if first is None:
+        raise DataSetError(f"{dataset}: no sample was solved, so there is nothing to describe")
+    info, figures = _Info(first), _Figures(first.features)
+    with parquet_writer(folder / places.EPISODES_PATH, schema) as file:
+        for shard in _written(dataset, shards):
+            rows = arrow().concat_tables(
+                [schema.empty_table(), _episode_rows(shard, task_of(about))],
+                promote_options="permissive",
+            )
+            file.write_table(rows)
+            info.add(shard)
+            figures.add(rows)
+    tasks = tasks_table([task_of(about)])
+    with parquet_writer(folder / places.TASKS_PATH, tasks.schema) as file:
+        file.write_table(tasks)
+    (folder / places.INFO_PATH).write_bytes(json_bytes(info.record()))
+    (folder / places.STATS_PATH).write_bytes(json_bytes(figures.record()))
+
+
+def _require_alike(dataset: Path, first: WrittenShard, other: WrittenShard) -> None:
+    alike = (first.features, frame_rate_hz(first.shard))
+    if (other.features, frame_rate_hz(other.shard)) != alike:
+        raise DataSetError(
+            f"{dataset}: shard {other.shard.name} has other columns or another frame rate than "
+            f"{first.shard.name}; write both with the same scene"
+        )
 
 
 def task_of(about: Mapping[str, Any]) -> str:
@@ -182,36 +194,51 @@ def _is_video(features: Mapping[str, Feature]) -> bool:
     return PICTURE in features and features[PICTURE].dtype == "video"
 
 
-def _info(written: Sequence[WrittenShard], features: Mapping[str, Feature]) -> dict[str, Any]:
-    rate = frame_rate_hz(written[0].shard)
-    records = {name: feature.record() for name, feature in features.items()}
-    if _is_video(features):
-        records[PICTURE]["info"] = _video_info(features[PICTURE], written[0].shard, rate)
-    splits = {}
-    for split in SPLITS:
-        mine = [w.episodes for w in written if w.shard.split == split]
-        if mine:
-            splits[split] = f"{mine[0][0]}:{mine[-1][-1] + 1}"
-    last = written[-1]
-    return {
-        "codebase_version": CODEBASE_VERSION,
-        "robot_type": ROBOT_TYPE,
-        "total_episodes": int(last.episodes[-1]) + 1,
-        "total_frames": int(last.first_frame + last.lengths.sum()),
-        "total_tasks": 1,
-        "chunks_size": places.FILES_PER_CHUNK,
-        "data_files_size_in_mb": _DATA_FILE_MB,
-        "video_files_size_in_mb": _VIDEO_FILE_MB,
-        "fps": rate,
-        "splits": splits,
-        "data_path": places.DATA_PATH,
-        "video_path": places.VIDEO_PATH if _is_video(features) else None,
-        "features": records,
-        "gelslim": {
-            "tactile_schema": TACTILE_SCHEMA,
-            "even_times": written[0].shard.frame_rate_hz is not None,
-        },
-    }
+class _Info:
+    """What `meta/info.json` says, from the shards one after the other."""
+
+    def __init__(self, first: WrittenShard) -> None:
+        self._first = first
+        self._splits: dict[str, tuple[int, int]] = {}
+        self._frames = 0
+
+    def add(self, written: WrittenShard) -> None:
+        """Take the next shard."""
+        name, end = written.shard.split, written.first_episode + written.table.num_rows
+        begin, _ = self._splits.get(name, (written.first_episode, 0))
+        self._splits[name] = begin, end
+        self._frames = written.first_frame + int(written.lengths.sum())
+
+    def record(self) -> dict[str, Any]:
+        """The content of the file."""
+        first = self._first
+        features, rate = {**first.features, **counter_features()}, frame_rate_hz(first.shard)
+        records = {name: feature.record() for name, feature in features.items()}
+        if _is_video(features):
+            records[PICTURE]["info"] = _video_info(features[PICTURE], first.shard, rate)
+        return {
+            "codebase_version": CODEBASE_VERSION,
+            "robot_type": ROBOT_TYPE,
+            "total_episodes": max(end for _, end in self._splits.values()),
+            "total_frames": self._frames,
+            "total_tasks": 1,
+            "chunks_size": places.FILES_PER_CHUNK,
+            "data_files_size_in_mb": _DATA_FILE_MB,
+            "video_files_size_in_mb": _VIDEO_FILE_MB,
+            "fps": rate,
+            "splits": {
+                split: "{}:{}".format(*self._splits[split])
+                for split in SPLITS
+                if split in self._splits
+            },
+            "data_path": places.DATA_PATH,
+            "video_path": places.VIDEO_PATH if _is_video(features) else None,
+            "features": records,
+            "gelslim": {
+                "tactile_schema": TACTILE_SCHEMA,
+                "even_times": first.shard.frame_rate_hz is not None,
+            },
+        }
 
 
 def _video_info(feature: Feature, shard: Shard, rate: float) -> dict[str, Any]:
@@ -229,25 +256,38 @@ def _video_info(feature: Feature, shard: Shard, rate: float) -> dict[str, Any]:
     }
 
 
-def _statistics(episodes: Any, features: Mapping[str, Feature]) -> dict[str, Any]:
+class _Figures:
     """Statistics of all columns, but for those that have a component without any value."""
-    found = {}
-    for name in (*features, "timestamp", "frame_index", "task_index"):
-        stacked = {
-            kind: _rows(episodes[f"stats/{name}/{kind}"])
-            for kind in ("min", "max", "mean", "std", "count", *statistics.QUANTILES)
-            if f"stats/{name}/{kind}" in episodes.column_names
-        }
-        if not stacked:
-            continue
-        whole = statistics.combined(stacked)
-        if all(np.isfinite(value).all() for value in whole.values()):
-            picture = name == PICTURE
-            found[name] = {
-                kind: (v.reshape(-1, 1, 1) if picture and kind != "count" else v).tolist()
-                for kind, v in whole.items()
+
+    def __init__(self, features: Mapping[str, Feature]) -> None:
+        names = (*features, "timestamp", "frame_index", "task_index")
+        self._by_column = {name: statistics.Combination() for name in names}
+
+    def add(self, episodes: Any) -> None:
+        """Take some rows of the table of episodes."""
+        for name, found in list(self._by_column.items()):
+            stacked = {
+                kind: _rows(episodes[f"stats/{name}/{kind}"])
+                for kind in ("min", "max", "mean", "std", "count", *statistics.QUANTILES)
+                if f"stats/{name}/{kind}" in episodes.column_names
             }
-    return found
+            if stacked:
+                found.add(stacked)
+            else:
+                del self._by_column[name]
+
+    def record(self) -> dict[str, Any]:
+        """The content of `meta/stats.json`."""
+        found = {}
+        for name, column in self._by_column.items():
+            whole = column.result()
+            if all(np.isfinite(value).all() for value in whole.values()):
+                picture = name == PICTURE
+                found[name] = {
+                    kind: (v.reshape(-1, 1, 1) if picture and kind != "count" else v).tolist()
+                    for kind, v in whole.items()
+                }
+        return found
 
 
 def _rows(column: Any) -> NDArray[np.float64]:

@@ -65,27 +65,50 @@ def of_pictures(pictures: Iterable[NDArray[np.uint8]]) -> dict[str, Array]:
     return {**{name: v.reshape(3, 1, 1) for name, v in found.items()}, "count": np.array([count])}
 
 
-def combined(episodes: Mapping[str, Array]) -> dict[str, Array]:
-    """Statistics of all episodes together; components that no episode has are NaN.
+class Combination:
+    """Statistics of many episodes, taken a few at a time; components that none has are NaN."""
 
-    Args:
-        episodes: (n, k) of n episodes by name, and their `count` (n, 1).
-    """
-    count, mean = episodes["count"], episodes["mean"]
-    weight = np.where(np.isfinite(mean), count, 0.0)
-    total = weight.sum(axis=0)
+    def __init__(self) -> None:
+        """Begin without an episode."""
+        self._count: Array = np.zeros(1)
+        self._extremes: dict[str, Array] = {}
+        self._weight: Array = np.zeros(1)
+        self._sums: dict[str, Array] = {}
+        self._spread: Array = np.zeros(1)
 
-    def weighted(values: Array) -> Array:
-        with np.errstate(invalid="ignore"):
-            share: Array = np.sum(weight * np.nan_to_num(values), axis=0) / total
-        return share
+    def add(self, episodes: Mapping[str, Array]) -> None:
+        """Take the statistics (n, k) of n episodes by name, and their `count` (n, 1)."""
+        count, mean = episodes["count"], episodes["mean"]
+        weight = np.where(np.isfinite(mean), count, 0.0)
+        sums = {
+            name: np.sum(weight * np.nan_to_num(episodes[name]), axis=0)
+            for name in ("mean", *QUANTILES)
+        }
+        total = weight.sum(axis=0)
+        middle = sums["mean"] / np.where(total > 0, total, 1.0)
+        apart = np.nan_to_num(episodes["std"]) ** 2 + (np.nan_to_num(mean) - middle) ** 2
+        spread = np.sum(weight * apart, axis=0)
+        if self._sums:
+            # Both parts spread about their own means (Chan, Golub and LeVeque 1983).
+            whole, other = total + self._weight, np.where(self._weight > 0, self._weight, 1.0)
+            gap = middle - self._sums["mean"] / other
+            share = total * self._weight / np.where(whole > 0, whole, 1.0)
+            spread = spread + self._spread + share * gap**2
+            total = whole
+            sums = {name: values + self._sums[name] for name, values in sums.items()}
+        self._count = self._count + count.sum(axis=0)
+        self._weight, self._sums, self._spread = total, sums, spread
+        for name, extreme in (("min", np.fmin), ("max", np.fmax)):
+            found: Array = extreme.reduce(episodes[name])
+            before = self._extremes.get(name)
+            self._extremes[name] = found if before is None else extreme(before, found)
 
-    whole = weighted(mean)
-    return {
-        "min": np.fmin.reduce(episodes["min"]),
-        "max": np.fmax.reduce(episodes["max"]),
-        "mean": whole,
-        "std": np.sqrt(weighted(episodes["std"] ** 2 + (mean - whole) ** 2)),
-        **{name: weighted(episodes[name]) for name in QUANTILES},
-        "count": count.sum(axis=0),
-    }
+    def result(self) -> dict[str, Array]:
+        """The statistics (k,) of all episodes together."""
+        some = np.where(self._weight > 0, self._weight, np.nan)
+        return {
+            **self._extremes,
+            "std": np.sqrt(self._spread / some),
+            **{name: values / some for name, values in self._sums.items()},
+            "count": self._count,
+        }

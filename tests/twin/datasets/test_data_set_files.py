@@ -304,8 +304,15 @@ def test_the_commands(place: Path, data_set: Path, capsys: pytest.CaptureFixture
     assert main(["dataset-verify", out]) == 1
     capsys.readouterr()
     assert main(["dataset", scene, "-o", out, *given]) == 0
-    last = capsys.readouterr().out.splitlines()[-1]
-    assert all((place / "typed" / name).exists() for name in last.split(": ")[1][:-1].split(", "))
+    named = capsys.readouterr().out.splitlines()[-1].split(": ")[1][:-1].split(", ")
+    splits = json.loads((place / "typed" / "dataset.json").read_text())["splits"]
+    assert named == ["dataset.json", "index.parquet", "sensors/", *sorted(f"{s}/" for s in splits)]
+    assert all((place / "typed" / name).exists() for name in named)
+    robot = str(place / "typed_lerobot")
+    assert main(["dataset", scene, "-o", robot, *given, "--format", "lerobot"]) == 0
+    named = capsys.readouterr().out.splitlines()[-1].split(": ")[1][:-1].split(", ")
+    assert named == ["data/", "dataset.json", "index.parquet", "meta/", "sensors/"]
+    assert all((place / "typed_lerobot" / name).exists() for name in named)
     assert main(["dataset-verify", out]) == 0
     assert main(["dataset-merge", out, str(data_set), "-o", str(place / "m")]) == 2
     assert "holds the sample" in capsys.readouterr().err

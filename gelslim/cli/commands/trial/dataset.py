@@ -21,6 +21,10 @@ Scheduler = Annotated[
 ]
 
 
+OWN_RECORDS = ("plan.json", "shards")
+"""What a data set holds for `gelslim dataset` itself."""
+
+
 def dataset(
     scene: SceneFile,
     count: Annotated[int, typer.Option(min=1, help="Number of samples.")],
@@ -124,6 +128,8 @@ def dataset_merge(
 
 def report(answer: dict[str, Any], seconds: float, as_json: bool) -> None:
     """Print what a data set holds; warnings go to standard error."""
+    from gelslim_twin.datasets.splits import FEWEST_TOOLS
+
     for observable, found in answer.get("over_tolerance", {}).items():
         unit = "N" if observable == "force" else "px"
         print(
@@ -150,15 +156,15 @@ def report(answer: dict[str, Any], seconds: float, as_json: bool) -> None:
         f"{answer['samples']} samples ({splits}) with {answer['frames']} frames, "
         f"{answer['bytes'] / 1e6:.4g} MB, {seconds:.1f} s."
     )
-    if set(answer["splits"]) == {"train"}:
+    if len(answer["tools"]) < FEWEST_TOOLS and set(answer["tools"].values()) == {"train"}:
         say(
             "All samples are for training, because fewer than three tools cannot be divided; list "
             "more under `vary.tools`, or write `split: {by: sample}` below `vary`."
         )
-    names = [
-        "index.parquet",
-        "dataset.json",
-        "sensors/",
-        *(f"{name}/" for name in answer["splits"]),
-    ]
-    print(f"In {answer['folder']}/: {', '.join(names)}.")
+    print(f"In {answer['folder']}/: {', '.join(_content(Path(answer['folder'])))}.")
+
+
+def _content(folder: Path) -> list[str]:
+    """Files and folders of a data set that its user reads, as they are on the disk."""
+    places = sorted(path for path in folder.iterdir() if path.name not in OWN_RECORDS)
+    return [path.name + "/" * path.is_dir() for path in places if not path.name.startswith(".")]
