@@ -33,9 +33,23 @@ def of_values(values: NDArray[Any]) -> dict[str, Array]:
             "max": np.nanmax(rows, axis=0),
             "mean": np.nanmean(rows, axis=0),
             "std": np.nanstd(rows, axis=0),
-            **{name: np.nanquantile(rows, share, axis=0) for name, share in QUANTILES.items()},
+            **dict(zip(QUANTILES, _quantiles(rows), strict=True)),
         }
     return {**found, "count": np.array([float(len(values))])}
+
+
+def _quantiles(rows: Array) -> Array:
+    """The quantiles (5, k) of rows (n, k), values that do not exist left out.
+
+    NumPy takes whole columns together and those with gaps one by one, a thousand times slower.
+    """
+    shares = list(QUANTILES.values())
+    whole = ~np.isnan(rows).any(axis=0)
+    found = np.empty((len(shares), rows.shape[1]))
+    found[:, whole] = np.quantile(rows[:, whole], shares, axis=0)
+    if not whole.all():
+        found[:, ~whole] = np.nanquantile(rows[:, ~whole], shares, axis=0)
+    return found
 
 
 def of_pictures(pictures: Iterable[NDArray[np.uint8]]) -> dict[str, Array]:

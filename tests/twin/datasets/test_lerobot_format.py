@@ -19,6 +19,7 @@ from PIL import Image
 
 from gelslim_twin.datasets.formats import DataSetError, Pictures, Shard, format_named
 from gelslim_twin.datasets.labels import MEANING
+from gelslim_twin.datasets.lerobot import statistics
 from gelslim_twin.datasets.lerobot.video_file import VideoFile
 from gelslim_twin.datasets.sample import Sample, SampleFrame, Split
 
@@ -280,3 +281,39 @@ def test_a_policy_of_lerobot_takes_the_observations_and_leaves_the_tactile_colum
     }  # fmt: skip
     for name, feature in taken.items():
         assert np.asarray(data.meta.stats[name]["std"]).min() > 0, feature
+
+
+@pytest.mark.parametrize("shape", [(1,), (2,), (9, 40), (3, 50, 3)])
+@pytest.mark.parametrize("gaps", [0.0, 0.3])
+def test_quantiles_are_those_of_each_column(shape: tuple[int, ...], gaps: float) -> None:
+    """Against NumPy on one column after the other, without the values that do not exist."""
+    rng = np.random.default_rng(len(shape))
+    values = rng.normal(size=shape).astype(np.float32)
+    values[rng.random(shape) < gaps] = np.nan
+    found = statistics.of_values(values)
+    columns = values.reshape(-1, shape[-1] if len(shape) > 1 else 1).T.astype(np.float64)
+    for name, share in statistics.QUANTILES.items():
+        held = [column[~np.isnan(column)] for column in columns]
+        wanted = [np.quantile(c, share) if len(c) else np.nan for c in held]
+        np.testing.assert_array_equal(found[name], wanted)
+
+
+@pytest.mark.parametrize("parts", [(12,), (5, 7), (1,) * 12])
+def test_statistics_do_not_depend_on_how_episodes_are_taken(parts: tuple[int, ...]) -> None:
+    """Against all values at once; the second component of some episodes does not exist."""
+    rng = np.random.default_rng(3)
+    episodes = [rng.normal(5.0, 2.0, (rng.integers(2, 9), 3)) for _ in range(12)]
+    for values in episodes[2:9:3]:
+        values[:, 1] = np.nan
+    of_each = [statistics.of_values(values) for values in episodes]
+    combination, first = statistics.Combination(), 0
+    for count in parts:
+        some = of_each[first : first + count]
+        combination.add({name: np.stack([one[name] for one in some]) for name in some[0]})
+        first += count
+    found, every = combination.result(), np.concatenate(episodes)
+    np.testing.assert_allclose(found["min"], np.nanmin(every, axis=0))
+    np.testing.assert_allclose(found["max"], np.nanmax(every, axis=0))
+    np.testing.assert_allclose(found["mean"], np.nanmean(every, axis=0))
+    np.testing.assert_allclose(found["std"], np.nanstd(every, axis=0))
+    assert found["count"] == [len(every)]
