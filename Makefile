@@ -94,10 +94,9 @@ $(VENV)/.installed-peers: pyproject.toml $(PINS)
 	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev,peers"
 	touch $@ $(VENV)/.installed-dev $(VENV)/.installed
 
-pins: $(VENV)/.installed-dev
-	( echo "# Pinned versions for make variant, make test and CI. Renew with: make pins"; \
-	  $(BIN)/pip freeze --exclude-editable | grep -vE '^(pip|setuptools|wheel)==' ) > $(PINS).new
-	mv $(PINS).new $(PINS)
+# Adds what is missing and drops what nothing needs; `make pins RENEW=1` takes the newest versions.
+pins:
+	$(PYTHON) tools/pins.py $(if $(RENEW),--renew)
 
 clean:
 	rm -rf $(VENV) out build *.egg-info

@@ -49,6 +49,7 @@ class VideoFile:
         lossless = quality >= _LOSSLESS
         crf = 0 if lossless else round(_WORST_CRF * (1 - quality / _LOSSLESS))
         codec, self._pixels = ("libx264rgb", "rgb24") if lossless else ("libsvtav1", "yuv420p")
+        self._is_begun = False
         self._least_px = 1 if lossless else _LEAST_PX
         options = {"crf": str(crf), "g": _GROUP, **(_LOSSLESS_OPTIONS if lossless else _OPTIONS)}
         rate = Fraction(frames_per_s).limit_denominator(1001)
@@ -76,8 +77,11 @@ class VideoFile:
                 f"pictures of {picture.shape[1]} x {picture.shape[0]} px: videos with losses need "
                 f"{self._least_px} px at least; write --quality {_LOSSLESS} or --pictures png"
             )
-        self._stream.height, self._stream.width = picture.shape[:2]
-        self._stream.pix_fmt = self._pixels
+        if not self._is_begun:
+            # Newer versions of PyAV refuse to be told of the size once the encoder is open.
+            self._stream.height, self._stream.width = picture.shape[:2]
+            self._stream.pix_fmt = self._pixels
+            self._is_begun = True
         self._write(self._av.VideoFrame.from_ndarray(picture, format="rgb24"))
 
     def finish(self) -> None:
