@@ -178,9 +178,12 @@ def data_set(
             are asked for.
         BudgetError: No plan keeps the budget.
         DataSetError: The folder holds something else, or the format has no such pictures.
+        EngineError: A script with several jobs has no `if __name__ == "__main__":`.
     """
     from gelslim.data_sets import made_data_set, prepared_data_set
+    from gelslim_core.jobs import Engine
 
+    Engine(jobs, scheduler).require_main()
     loaded, _ = with_budget(scene_of(scene), budget)
     folder = Path("out") / loaded.scene.name if out is None else Path(out)
     job = prepared_data_set(

@@ -21,31 +21,19 @@ from multiprocessing.connection import wait
 from types import FrameType
 from typing import Any, Literal, TypeVar
 
-from gelslim_core.errors import GelslimError
+from gelslim_core.cluster import MAX_CRASHES, EngineError, on_cluster
 from gelslim_core.files.held_interrupt import (
     RETRY_S,
     interrupts_held,
     must_not_be_interrupted,
     repeat_signal,
 )
-from gelslim_core.optional_library import load
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 CONNECT_S = 10
 TASKS_PER_WORKER = 4
 """Tasks submitted at one time, per worker; tasks that are not yet submitted can be dropped."""
-MAX_CRASHES = 3
-"""Crashes of a worker during the same task after which the task is given up."""
-
-
-class EngineError(GelslimError, ValueError):
-    """Tasks cannot be started, or one of them crashes its workers; the message says why.
-
-    Attributes:
-        exit_status: 2, as for all input that cannot be used.
-        kind: `bad input`.
-    """
 
 
 @dataclass(frozen=True)
@@ -79,12 +67,26 @@ class Engine:
             MissingLibraryError: There is a scheduler, but the extra `cluster` is not installed.
         """
         if self.scheduler:
-            yield from _on_cluster(perform, tasks, self.scheduler)
+            yield from on_cluster(perform, tasks, self.scheduler, TASKS_PER_WORKER, CONNECT_S)
         elif self.jobs == 1 or len(tasks) < 2:
             for number, task in enumerate(tasks):
                 yield number, perform(task)
         else:
             yield from _in_pools(perform, tasks, min(self.jobs, len(tasks)))
+
+    def require_main(self) -> None:
+        """Refuse to start processes from a script that a worker process is importing.
+
+        Raises:
+            EngineError: The script starts its work on import. Its workers would do all of it
+                again, or wait for ever for a folder that it has locked.
+        """
+        importing = getattr(multiprocessing.current_process(), "_inheriting", False)
+        if importing and self.jobs > 1 and not self.scheduler:
+            raise EngineError(
+                "worker processes import your script again, so its work must stand below "
+                '`if __name__ == "__main__":`; or use one job'
+            )
 
 
 def processors() -> int:
@@ -144,31 +146,6 @@ def _in_pool(
     finally:
         for future in running:
             future.cancel()
-
-
-def _on_cluster(
-    perform: Callable[[Task], Result], tasks: Sequence[Task], address: str
-) -> Iterator[tuple[int, Result]]:
-    distributed = load("distributed", "--scheduler")
-    try:
-        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise EngineError(
-            f"--scheduler {address}: no Dask scheduler answers within {CONNECT_S} s ({error}); "
-            "start one with `dask scheduler` and workers with `dask worker ADDRESS`"
-        ) from error
-    with client, client.as_current():
-        if not client.scheduler_info()["workers"]:
-            raise EngineError(
-                f"--scheduler {address}: the cluster has no workers; start some with "
-                f"`dask worker {address}` where gelslim-cad is installed"
-            )
-        futures = {
-            client.submit(perform, task, pure=False, retries=MAX_CRASHES): number
-            for number, task in enumerate(tasks)
-        }
-        for future in distributed.as_completed(list(futures)):
-            yield futures[future], future.result()
 
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)

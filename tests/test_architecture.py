@@ -39,7 +39,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "errors", "lazy", "optional_library", "uncertainty", "immutable", "figure", "html_table",
         "kernel_cache",
         "files",
-        "budget", "jobs", "yaml",
+        "budget", "cluster", "jobs", "yaml",
     ),
     "gelslim_optics": ("camera", "guide", "light"),
     "ifem_export": (

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gelslim_twin.datasets.formats import FramePlace, Pictures, Shard, require_stills
 from gelslim_twin.datasets.picture_files import decoded, encoded
 from gelslim_twin.datasets.sample import Sample
+from ifem_export.bundle.array_file import save_array
 
 ARRAYS = ".npy"
 
@@ -48,7 +49,11 @@ class FolderWriter:
     def finish(self) -> None:
         """Write the arrays."""
         for name, arrays in self._held.items():
-            np.save(self._place / f"{name}{ARRAYS}", np.stack(arrays))
+            with open(self._place / f"{name}{ARRAYS}", "wb") as file:
+                save_array(file, np.stack(arrays))
+
+    def abandon(self) -> None:
+        """No file is open."""
 
 
 class Folder:

@@ -115,6 +115,12 @@ class SampleWriter(Protocol):
     def finish(self) -> None:
         """Complete all files. No `add` follows."""
 
+    def abandon(self) -> None:
+        """Close all files of a shard that cannot be completed, whose folder is then removed.
+
+        What the disk says against it is of no interest.
+        """
+
 
 class DataSetFormat(Protocol):
     """One format of data sets."""

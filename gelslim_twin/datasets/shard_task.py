@@ -132,11 +132,29 @@ def _performed(task: ShardTask) -> dict[str, Any]:
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
     try:
-        writer = format_named(job.format).writer(work, shard, task.about)
-        rows: list[Mapping[str, Value]] = []
-        failures: list[Failure] = []
-        arrays: dict[str, tuple[tuple[int, ...], str]] = {}
-        maker = maker_of(job)
+        rows, failures, arrays = _written(task, work)
+        files = moved(work, job.out_folder)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    record = ShardRecord(
+        job.key, shard.name, shard.samples, len(rows), files, tuple(failures), arrays
+    )
+    write_record(job.out_folder, record, rows)
+    return {"samples": len(shard.samples) - len(failures), "frames": len(rows),
+            "failed": len(failures)}  # fmt: skip
+
+
+def _written(
+    task: ShardTask, work: Path
+) -> tuple[list[Mapping[str, Value]], list[Failure], dict[str, tuple[tuple[int, ...], str]]]:
+    """Make and write all samples; returns rows, failures, shapes and types of the arrays."""
+    job, shard = task.job, task.shard
+    rows: list[Mapping[str, Value]] = []
+    failures: list[Failure] = []
+    arrays: dict[str, tuple[tuple[int, ...], str]] = {}
+    maker = maker_of(job)
+    writer = format_named(job.format).writer(work, shard, task.about)
+    try:
         for number in shard.samples:
             try:
                 sample = maker.sample(number)
@@ -147,15 +165,10 @@ def _performed(task: ShardTask) -> dict[str, Any]:
             rows += rows_of(sample, places, shard.name, len(rows))
             arrays = arrays or _arrays_of(sample)
         writer.finish()
-        files = moved(work, job.out_folder)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
-    record = ShardRecord(
-        job.key, shard.name, shard.samples, len(rows), files, tuple(failures), arrays
-    )
-    write_record(job.out_folder, record, rows)
-    return {"samples": len(shard.samples) - len(failures), "frames": len(rows),
-            "failed": len(failures)}  # fmt: skip
+    except BaseException:
+        writer.abandon()
+        raise
+    return rows, failures, arrays
 
 
 def _arrays_of(sample: Sample) -> dict[str, tuple[tuple[int, ...], str]]:

@@ -9,6 +9,7 @@ The files of a frame follow one another and have its key as the first part of th
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import math
@@ -72,6 +73,11 @@ class TarWriter:
     def finish(self) -> None:
         """Write the end of the file."""
         self._tar.close()
+
+    def abandon(self) -> None:
+        """Close the file."""
+        with contextlib.suppress(OSError):
+            self._tar.close()
 
 
 class WebDataSet:

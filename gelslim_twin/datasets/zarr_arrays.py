@@ -9,6 +9,7 @@ Every chunk is one frame, so that frames are read in any order and a writer keep
 
 from __future__ import annotations
 
+import contextlib
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -78,6 +79,11 @@ class ZarrWriter:
         for key in sorted(described):
             self._write(key, described[key].to_bytes())
         self._zip.close()
+
+    def abandon(self) -> None:
+        """Close the file, which would else complain when it is deleted from memory."""
+        with contextlib.suppress(OSError):
+            self._zip.close()
 
 
 MOST_FRAMES = 1_000_000

@@ -10,13 +10,14 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.files.file_lock import beside, locked
 from gelslim_core.files.replaced_folder import FolderError, recover, replaced_folder
+from ifem_export.bundle.array_file import save_array
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.check import check_adjoint, check_bundle
 from ifem_export.bundle.layout import bundle_arrays, bundle_from
@@ -186,18 +187,11 @@ def _files_of(folder: Path) -> set[str]:
     return {MANIFEST, LADDER, *(str(e.get("file")) for e in entries if isinstance(e, dict))}
 
 
-class _Stream:
-    """A stream without a file descriptor, so that NumPy reports why a full disk fails."""
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self.write = stream.write
-
-
 def _write_array(folder: Path, name: str, array: NDArray[Any]) -> dict[str, Any]:
     file = f"{name}.npy"
     contiguous = np.ascontiguousarray(array)
     with open(folder / file, "wb") as stream:
-        np.save(_Stream(stream), contiguous, allow_pickle=False)
+        save_array(stream, contiguous)
     return {
         "file": file,
         "sha256": _sha256(folder / file),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import multiprocessing
 import sys
 from pathlib import Path
 
@@ -58,7 +59,20 @@ def test_a_local_cluster_gives_the_same() -> None:
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
     ) as cluster:
         found = dict(Engine(scheduler=cluster.scheduler_address).run(pool_tasks.square, [3, 4]))
-    assert found == {0: 9, 1: 16}
+        assert found == {0: 9, 1: 16}
+        # More than are submitted at one time.
+        many = dict(Engine(scheduler=cluster.scheduler_address).run(pool_tasks.square, range(23)))
+    assert many == {k: k * k for k in range(23)}
+
+
+def test_a_script_that_its_workers_would_run_again_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    Engine(2).require_main()
+    monkeypatch.setattr(multiprocessing.current_process(), "_inheriting", True, raising=False)
+    Engine(1).require_main()
+    with pytest.raises(EngineError, match="__main__"):
+        Engine(2).require_main()
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="forks")

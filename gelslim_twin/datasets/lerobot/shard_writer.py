@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.errors import OutputError
 from gelslim_twin.datasets.formats import DataSetError, FramePlace, Shard
 from gelslim_twin.datasets.lerobot import statistics
 from gelslim_twin.datasets.lerobot.arrow_tables import arrow, frame_table, parquet_writer
@@ -97,6 +99,13 @@ class ShardWriter:
         table = table.replace_schema_metadata({"features": json.dumps(features)})
         with parquet_writer(self._folder / episode_file(self._shard), table.schema) as file:
             file.write_table(table)
+
+    def abandon(self) -> None:
+        """Close all files."""
+        for file in (self._parquet, self._video):
+            if file is not None:
+                with contextlib.suppress(OSError, OutputError):
+                    file.close()
 
     def _counters(self, sample: Sample) -> dict[str, NDArray[Any]]:
         count = len(sample.frames)

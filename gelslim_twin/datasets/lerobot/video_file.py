@@ -87,7 +87,14 @@ class VideoFile:
     def finish(self) -> None:
         """Write what is still in the encoder, and close the file. Raises OutputError."""
         self._write(None)
-        self._file.close()
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, complete or not. Raises OutputError."""
+        try:
+            self._file.close()
+        except OSError as error:
+            raise disk_error(self.path, "closing the video", error) from error
 
     def _write(self, frame: Any) -> None:
         try:

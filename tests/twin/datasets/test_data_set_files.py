@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import json
 import shutil
@@ -17,6 +18,7 @@ from data_set_rig import hashes, job_in, made, written
 from sampled import quick
 
 from gelslim.cli.main import main
+from gelslim_core.errors import OutputError
 from gelslim_core.jobs import Engine
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.datasets import shard_task
@@ -27,6 +29,9 @@ from gelslim_twin.datasets.making import SampleMaker
 from gelslim_twin.datasets.merge import merge
 from gelslim_twin.datasets.sample import SPLITS
 from gelslim_twin.datasets.verify import verify
+
+MOST_BYTES = 4096
+"""Less than a picture has."""
 
 
 @pytest.fixture
@@ -339,3 +344,34 @@ def test_the_engine_runs_what_is_missing_only(place: Path, data_set: Path) -> No
     after = hashes(job.out_folder)
     after.pop("dataset.json")
     assert after == before
+
+
+@pytest.mark.parametrize(
+    "kind", quick(["folder", "webdataset", "zarr", "lerobot"], "folder".__eq__)
+)
+def test_a_disk_that_refuses_is_told_once(
+    place: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a limit of the size of files; nothing complains when open files are deleted later."""
+    resource = pytest.importorskip("resource", reason="limits of POSIX")
+    if kind == "zarr":
+        pytest.importorskip("zarr", reason="arrays need the extra `zarr`")
+    ignored: list[object] = []
+    monkeypatch.setattr("sys.unraisablehook", lambda raised: ignored.append(raised.exc_value))
+    job = job_in(place / "scene.yaml", f"full_{kind}", format_name=kind)
+    real, (soft, hard) = SampleMaker.sample, resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def sample(self: SampleMaker, number: int) -> object:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (MOST_BYTES, hard))
+        return real(self, number)
+
+    monkeypatch.setattr(SampleMaker, "sample", sample)
+    try:
+        with pytest.raises(OutputError, match="too large"):
+            make_data_set(job, 8)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    gc.collect()
+    assert not ignored
+    assert not list(job.out_folder.glob(f"{shard_task.WORK}*"))
+    shutil.rmtree(job.out_folder)
