@@ -1,17 +1,18 @@
-"""Peak memory of this process while data sets of growing size are made; run by a test.
+"""Peak memory of this process in each stage of data sets of two sizes; run by a test on Linux.
 
     python tests/twin/data_set_memory.py FOLDER
 
-Everything but the samples themselves is that of `gelslim dataset`. Prints the peak in bytes after
-each stage as JSON.
+Everything but the samples themselves is that of `gelslim dataset`. Prints the peaks in bytes as
+JSON.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import resource
+import re
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,30 +46,39 @@ def sample(maker: SampleMaker, number: int) -> Sample:
     )
 
 
-def peak_bytes() -> int:
-    """Largest memory of this process so far."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+def peak_bytes(stage: Callable[[], object]) -> int:
+    """Largest memory of this process in a stage, by the kernel's count."""
+    Path("/proc/self/clear_refs").write_text("5")  # forgets the peak of before
+    stage()
+    found = re.search(r"VmHWM:\s+([0-9]+) kB", Path("/proc/self/status").read_text())
+    assert found is not None
+    return 1024 * int(found.group(1))
 
 
 def main() -> None:
     folder, found = Path(sys.argv[1]), {}
     SampleMaker.sample = sample  # type: ignore[method-assign]
-    given = {"frames_per_shard": 1024}
-    scene = written(folder)
-    one = job_in(scene, "one", **given)
-    other = job_in(written(folder, ("seed: 8", "seed: 9"), "other.yaml"), "other", **given)
-    make_data_set(other, FEW)
-    for count in (FEW, MANY):
-        make_data_set(one, count)
-        found[f"made {count}"] = peak_bytes()
-    assert verify(one.out_folder)["faults"] == []
-    found["verified"] = peak_bytes()
-    assert merge([one.out_folder, other.out_folder], folder / "merged")["samples"] == FEW + MANY
-    found["merged"] = peak_bytes()
+    scene, given = written(folder), {"frames_per_shard": 1024}
+    one, two, three = (
+        job_in(written(folder, ("seed: 8", f"seed: {k}"), f"{k}.yaml"), f"set_{k}", **given)
+        for k in (1, 2, 3)
+    )
     robot = job_in(scene, "robot", format_name="lerobot", **given)
-    for count in (FEW, MANY):
-        described(robot, count)
-        found[f"described {count}"] = peak_bytes()
+    for job in (two, three):
+        make_data_set(job, FEW)
+    for count, mine, other in ((FEW, two, three), (MANY, one, two)):
+        stages: dict[str, Callable[[], object]] = {
+            "made": lambda job=one, count=count: make_data_set(job, count),
+            "verified": lambda job=mine: verify(job.out_folder),
+            "merged": lambda a=mine, b=other, count=count: merge(
+                [a.out_folder, b.out_folder], folder / f"merged_{count}"
+            ),
+            "described": lambda count=count: described(robot, count),
+        }
+        found |= {f"{name} {count}": peak_bytes(stage) for name, stage in stages.items()}
+    for place, count in ((one.out_folder, MANY), (folder / f"merged_{MANY}", MANY + FEW)):
+        answer = verify(place)
+        assert (answer["samples"], answer["faults"]) == (count, [])
     print(json.dumps(found))
 
 

@@ -31,6 +31,8 @@ from gelslim_twin.datasets.sample import Sample
 
 _GROUP_BYTES = 1 << 26
 """Frames are written in groups of about this size."""
+_EPISODES_WAITING = 64
+"""Episodes that are kept as Python's objects, which take ten times the room of a table."""
 UNEVEN_RATE_HZ = 1
 """Rate of a data set whose frames have no even times; their timestamps count them."""
 
@@ -58,6 +60,7 @@ class ShardWriter:
         self._parquet: Any = None
         self._video: VideoFile | None = None
         self._episodes: list[dict[str, Any]] = []
+        self._episode_tables: list[Any] = []
 
     def add(self, sample: Sample) -> tuple[FramePlace, ...]:
         """Take the next sample. Returns the row of each of its frames in the file of frames.
@@ -83,6 +86,8 @@ class ShardWriter:
         if is_video and PICTURE in features:
             self._film(sample)
         self._episodes.append(self._episode(sample, columns))
+        if len(self._episodes) == _EPISODES_WAITING:
+            self._tabulate()
         first, self._rows = self._rows, self._rows + len(sample.frames)
         name = data_file(self._shard).as_posix()
         return tuple(FramePlace(name, str(row)) for row in range(first, self._rows))
@@ -95,10 +100,17 @@ class ShardWriter:
         if self._video is not None:
             self._video.finish()
         features = {name: feature.record() for name, feature in self._features.items()}
-        table = arrow().Table.from_pylist(self._episodes)
+        self._tabulate()
+        table = arrow().concat_tables(self._episode_tables, promote_options="permissive")
         table = table.replace_schema_metadata({"features": json.dumps(features)})
         with parquet_writer(self._folder / episode_file(self._shard), table.schema) as file:
             file.write_table(table)
+
+    def _tabulate(self) -> None:
+        """Put the episodes that wait into a table."""
+        if self._episodes or not self._episode_tables:
+            self._episode_tables.append(arrow().Table.from_pylist(self._episodes))
+            self._episodes = []
 
     def abandon(self) -> None:
         """Close all files."""

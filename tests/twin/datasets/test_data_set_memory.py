@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("pyarrow", reason="data sets need the extra `record`")
-pytest.importorskip("resource", reason="peaks of memory as POSIX counts them")
 TESTS = Path(__file__).parents[2]
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peaks as Linux counts them")
 def test_a_hundred_thousand_samples_take_the_memory_of_ten_thousand(tmp_path: Path) -> None:
     paths = [str(TESTS.parent), str(TESTS), str(TESTS / "twin"), os.environ.get("PYTHONPATH", "")]
     ran = subprocess.run(
@@ -25,8 +25,10 @@ def test_a_hundred_thousand_samples_take_the_memory_of_ten_thousand(tmp_path: Pa
     )  # fmt: skip
     assert ran.returncode == 0, ran.stderr
     peak = json.loads(ran.stdout.splitlines()[-1])
-    more = 102_400 - 10_240
-    assert (peak["made 102400"] - peak["made 10240"]) / more < 100
-    assert (peak["verified"] - peak["made 102400"]) / more < 100
-    assert (peak["merged"] - peak["verified"]) / more < 100
-    assert (peak["described 102400"] - peak["described 10240"]) / more < 500
+    growth = {
+        stage: (peak[f"{stage} 102400"] - peak[f"{stage} 10240"]) / (102_400 - 10_240)
+        for stage in ("made", "verified", "merged", "described")
+    }
+    # In bytes per sample. The description of LeRobot has statistics of every episode in its table.
+    assert max(growth["made"], growth["verified"], growth["merged"]) < 100, growth
+    assert growth["described"] < 500, growth
