@@ -8,6 +8,8 @@ JSON.
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import json
 import os
 import re
@@ -21,6 +23,7 @@ from data_set_rig import job_in, written
 
 from gelslim_twin.datasets.data_set import all_shards, make_data_set
 from gelslim_twin.datasets.formats import format_named
+from gelslim_twin.datasets.job import DataSetJob
 from gelslim_twin.datasets.lerobot import places
 from gelslim_twin.datasets.making import SampleMaker
 from gelslim_twin.datasets.merge import merge
@@ -48,6 +51,10 @@ def sample(maker: SampleMaker, number: int) -> Sample:
 
 def peak_bytes(stage: Callable[[], object]) -> int:
     """Largest memory of this process in a stage, by the kernel's count."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)  # else what was freed before hides what grows now
     Path("/proc/self/clear_refs").write_text("5")  # forgets the peak of before
     stage()
     found = re.search(r"VmHWM:\s+([0-9]+) kB", Path("/proc/self/status").read_text())
@@ -66,6 +73,10 @@ def main() -> None:
     robot = job_in(scene, "robot", format_name="lerobot", **given)
     for job in (two, three):
         make_data_set(job, FEW)
+        verify(job.out_folder)
+    # Libraries and allocators take their shares once.
+    merge([two.out_folder, three.out_folder], folder / "merged")
+    described(robot, FEW, folder / "described")
     for count, mine, other in ((FEW, two, three), (MANY, one, two)):
         stages: dict[str, Callable[[], object]] = {
             "made": lambda job=one, count=count: make_data_set(job, count),
@@ -73,7 +84,7 @@ def main() -> None:
             "merged": lambda a=mine, b=other, count=count: merge(
                 [a.out_folder, b.out_folder], folder / f"merged_{count}"
             ),
-            "described": lambda count=count: described(robot, count),
+            "described": lambda count=count: described(robot, count, folder / f"described_{count}"),
         }
         found |= {f"{name} {count}": peak_bytes(stage) for name, stage in stages.items()}
     for place, count in ((one.out_folder, MANY), (folder / f"merged_{MANY}", MANY + FEW)):
@@ -82,7 +93,7 @@ def main() -> None:
     print(json.dumps(found))
 
 
-def described(job, count: int) -> None:  # type: ignore[no-untyped-def]
+def described(job: DataSetJob, count: int, target_folder: Path) -> None:
     """Describe a data set of LeRobot whose shards have the content of the first."""
     wanted = all_shards(replace(job, division=replace(job.division, tools=("train",) * 3)), count)
     first = job.out_folder / places.episode_file(wanted[0])
@@ -94,10 +105,9 @@ def described(job, count: int) -> None:  # type: ignore[no-untyped-def]
             target.parent.mkdir(parents=True, exist_ok=True)
             if not target.exists():
                 os.link(job.out_folder / place(wanted[0]), target)
-    described_in = job.out_folder / f"described_{count}"
-    described_in.mkdir()
-    format_named("lerobot").complete(described_in, job.out_folder, wanted, {"name": "touches"})
-    told = json.loads((described_in / places.INFO_PATH).read_bytes())
+    target_folder.mkdir()
+    format_named("lerobot").complete(target_folder, job.out_folder, wanted, {"name": "touches"})
+    told = json.loads((target_folder / places.INFO_PATH).read_bytes())
     assert told["total_episodes"] == count
 
 
