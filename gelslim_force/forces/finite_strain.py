@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ifem_export.bundle.bundle import Bundle
-from ifem_export.elements.membrane import membrane_stiffness
 from ifem_export.elements.skin import Membrane
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 from ifem_export.operators.pad_system import PadSystem, checked_field
@@ -80,6 +79,8 @@ class FiniteStrainForce:
     @cached_property
     def _skin(self) -> sparse.csr_array:
         """Stiffness (3c, 3c) of the membranes, whose strain stays small."""
+        from ifem_export.elements.membrane import membrane_stiffness
+
         return membrane_stiffness(self.bundle.mesh, self.membranes)
 
     def _gel_force(self, u: Array) -> Array:

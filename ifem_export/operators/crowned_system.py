@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ifem_export.assembly.assembly import mesh_stiffness
-from ifem_export.elements.membrane import membrane_stiffness
 from ifem_export.elements.skin import Membrane
 from ifem_export.errors import MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
@@ -56,6 +55,8 @@ class CrownedSystem(PadSystem):
         if self.mesh.surface_shift is None:
             raise MeshError("the pad is not crowned: it has no surface between nodes", field="mesh")
         if self.membranes:
+            from ifem_export.elements.membrane import membrane_stiffness
+
             membrane_stiffness(self.mesh, self.membranes)
 
     @property

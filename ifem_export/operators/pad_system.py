@@ -15,12 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ifem_export.assembly.assembly import corner_fill, mesh_stiffness
-from ifem_export.elements.membrane import (
-    membrane_blocks,
-    membrane_stiffness,
-    membrane_symbol,
-    with_skin,
-)
 from ifem_export.elements.skin import Membrane
 from ifem_export.errors import IfemError, MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
@@ -144,6 +138,8 @@ class PadSystem:
         """
         pad = mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
         if self.membranes:
+            from ifem_export.elements.membrane import membrane_stiffness, with_skin
+
             pad = with_skin(pad, membrane_stiffness(self.mesh, self.membranes))
         return pad, 3 * self.columns
 
@@ -184,6 +180,8 @@ class PadSystem:
 
     def _scaled(self, transform: Callable[[Array], Array]) -> Preconditioner:
         if self.membranes and self.mesh.fill is None and transform is inverse:
+            from ifem_export.elements.membrane import membrane_symbol
+
             size = self.mesh.cell_size_mm[:2]
             return self.eliminated(lambda shape: membrane_symbol(size, self.membranes, shape))
         if self.mesh.fill is None and 18 * self.layers**2 * self.columns > MOST_BLOCK_BYTES:
@@ -204,6 +202,8 @@ class PadSystem:
         """Stiffness blocks (ky, kx half, 3L, 3L) of the infinite pad with its membranes."""
         if not self.membranes:
             return blocks
+        from ifem_export.elements.membrane import membrane_blocks
+
         shape = blocks.shape[0], 2 * (blocks.shape[1] - 1)
         found = blocks.copy()
         size = self.mesh.cell_size_mm[:2]
