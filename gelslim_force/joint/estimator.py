@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
+from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces
 from gelslim_force.joint.light_sums import LightSums, placed_bins
@@ -31,6 +32,7 @@ from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
 from gelslim_force.joint.normal_equations import Linearised, NormalEquations
 from gelslim_force.joint.off_design import OffDesign
+from gelslim_force.joint.refinement import refined
 from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes, rise_of
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
@@ -79,6 +81,7 @@ class JointEstimator:
         relief: What the heights of a deep dent do to its light; None without directions of light.
         deep_mm: Depth from which a contact is deep.
         finer: The surface between the nodes, as the light sees it; None for cubic convolution.
+        pressure: Normal forces at half the pitch; None for those on the nodes alone.
     """
 
     points_mm: Array
@@ -102,6 +105,7 @@ class JointEstimator:
     relief: NodeRelief | None = None
     deep_mm: float = math.inf
     finer: FinerSurface | None = None
+    pressure: FinerPressure | None = None
 
     def estimate(
         self,
@@ -138,9 +142,8 @@ class JointEstimator:
             if is_new_contact(region, last.seen, self.lattice):
                 begun = self._rounds(frame, region, begun[1], self.settings.rounds)
         nodes = region & self.lattice.widened(begun[0], 1)
-        return self._found(
-            frame, region, *self._rounds(frame, nodes, begun[1], self.settings.following_rounds)
-        )
+        nodes, state = self._rounds(frame, nodes, begun[1], self.settings.following_rounds)
+        return self._found(frame, region, nodes, refined(self, frame, np.flatnonzero(nodes), state))
 
     def shown(self, image: NDArray[np.uint8], markers_px: Array) -> Mask:
         """(c,) nodes whose slope the light of a frame shows, with arguments as in `estimate`.
@@ -157,7 +160,7 @@ class JointEstimator:
             if number > 0:
                 wider = state.force_n
                 pressure = -state.force_n[:, 2] / self.area_mm2
-                least = settings_at(self.settings, self._deepness(state)).least_pressure
+                least = settings_at(self.settings, self.deepness(state)).least_pressure
                 nodes = pressing_nodes(nodes, pressure, self.neighbours, least)
                 held = self._held(state, np.flatnonzero(nodes))
                 if held is not None:
@@ -171,7 +174,7 @@ class JointEstimator:
 
         None where the gel moves so far that these do not hold, and for deep contacts.
         """
-        if state.data is None or self._deepness(state) > 0:
+        if state.data is None or self.deepness(state) > 0:
             return None
         data = state.data.on(nodes)
         found = self._solved(data)
@@ -184,13 +187,13 @@ class JointEstimator:
 
     def _settled(self, frame: FrameData, nodes: Mask, state: FitState) -> FitState:
         """A deep contact after as many more linearisations as it needs."""
-        for _ in range(self.settings.deep_rounds if self._deepness(state) > 0 else 0):
+        for _ in range(self.settings.deep_rounds if self.deepness(state) > 0 else 0):
             before, state = state, self._round(frame, np.flatnonzero(nodes), state)
             if state.near(before, _SETTLED):
                 break
         return state
 
-    def _deepness(self, state: FitState) -> float:
+    def deepness(self, state: FitState) -> float:
         return deepness(state.near_mm, self.deep_mm)
 
     @cached_property
@@ -225,18 +228,18 @@ class JointEstimator:
 
     def _linearised(self, frame: FrameData, nodes: Nodes, state: FitState) -> Linearised:
         """The data near the contact, linear about the state."""
-        offset, near = self._offset(state), np.zeros(len(self.points_mm), dtype=bool)
+        offset, near = self.offset(state), np.zeros(len(self.points_mm), dtype=bool)
         near[nodes] = True
         moved = state.linear_mm(nodes, near) + offset
-        markers = self._marker_rows(frame, near, moved)
+        markers = self.marker_rows(frame, near, moved)
         data = NormalEquations.of(3 * len(nodes))
         data = data.with_rows(markers.rows, markers.residual, markers.weight)
-        light, heights = self._light(frame, near, moved, state), None
+        light, heights = self.light_sums(frame, near, moved, state), None
         if light is not None:
             heights = self.responses.of_heights(nodes, light.nodes)
             gain = 1 - state.gain, self.settings.gain_sigma
             data = data.with_light(light, heights, gain)
-        start, deep = state.force_n[nodes].ravel(), self._deepness(state)
+        start, deep = state.force_n[nodes].ravel(), self.deepness(state)
         return Linearised(
             nodes, start, moved, offset, state.gain, deep, data, markers, light, heights
         )
@@ -264,7 +267,7 @@ class JointEstimator:
         height = data.moved_mm[light.nodes, 2] + higher
         return FitState(force, motion, gain, equations, data.markers, left, data, height)
 
-    def _offset(self, state: FitState) -> Array:
+    def offset(self, state: FitState) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
         depth = -float(state.near_mm.min(initial=0.0))
         if self.strained is None or depth <= self.strained_from_mm:
@@ -272,7 +275,7 @@ class JointEstimator:
         whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
         return np.asarray(state.displacement_mm - whole)
 
-    def _marker_rows(self, frame: FrameData, near: Mask, moved_mm: Array) -> MarkerRows:
+    def marker_rows(self, frame: FrameData, near: Mask, moved_mm: Array) -> MarkerRows:
         """The markers near the contact: lateral motion by the picture and the height.
 
         What is not resolved: a share of the motion of all, and of each marker's `bending`.
@@ -293,19 +296,27 @@ class JointEstimator:
         """(2n, c) `nodes_to_markers` over `bending`."""
         return sparse.csr_array(sparse.vstack([self.nodes_to_markers, self.bending]))
 
-    def _light(
-        self, frame: FrameData, near: Mask, moved_mm: Array, state: FitState
+    def light_sums(
+        self, frame: FrameData, near: Mask, moved_mm: Array, state: FitState, finer_mm: Any = None
     ) -> LightSums | None:
-        """The change of light near the contact, linear about the present motion (c, 3)."""
+        """The change of light near the contact, linear about the present motion (c, 3).
+
+        It is by the heights of the nodes, or by those of the finer surface where they are given.
+        """
         if self.light is None or self.law is None or frame.seen is None:
             return None
         wide = self.lattice.widened(near, self.settings.light_reach)
         relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
-        finer = None if self.finer is None else self.finer.seen(near, moved_mm, state.force_n)
-        bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide, relief, finer)
-        chosen = settings_at(self.settings, self._deepness(state))
+        finer, by_finer = None, finer_mm is not None
+        if self.finer is not None:
+            held = (self.finer.lattice, finer_mm)
+            finer = held if by_finer else self.finer.seen(near, moved_mm, state.force_n)
+        at = self.light, frame.seen, self.lattice, moved_mm, wide
+        bins = placed_bins(*at, relief, finer, by_finer)
+        chosen = settings_at(self.settings, self.deepness(state))
         error = math.hypot(chosen.light_error, chosen.light_share * rms_length(bins.change.T))
-        return bins.sums(self.law, moved_mm[:, 2], state.gain, error)
+        heights = finer_mm if by_finer else moved_mm[:, 2]
+        return bins.sums(self.law, heights, state.gain, error)
 
     @cached_property
     def _near_edge(self) -> Mask:

@@ -154,10 +154,12 @@ def placed_bins(
     near: Mask,
     relief: Array | None = None,
     finer: tuple[NodeLattice, Array] | None = None,
+    by_finer: bool = False,
 ) -> PlacedBins:
     """The valid bins of a frame among the nodes `near` (c,), with the `relief` (c, k) of the nodes.
 
     `finer` is a finer lattice with the heights (f,) of its places, from which present slopes come.
+    With `by_finer` their derivatives are those by these heights, too.
 
     The line of sight of a bin meets the surface where it is now; the motion (c, 3) of the nodes
     leads from there to the place at rest. Slopes are those of the deformed surface.
@@ -168,11 +170,14 @@ def placed_bins(
         return np.take(layers.reshape(*layers.shape[:-2], -1), bins, axis=-1)
 
     taps, slope = lattice.slopes_at(places), None
-    if finer is not None:
-        flat = finer[0].slopes_at(places).slopes(finer[1])
-        slope = np.einsum("nij,nj->ni", taps.turn(displacement_mm[:, :2]), flat)
+    if finer is None:
+        taps = taps.on_deformed(displacement_mm[:, :2])
+    else:
+        turn, flat = taps.turn(displacement_mm[:, :2]), finer[0].slopes_at(places)
+        slope = np.einsum("nij,nj->ni", turn, flat.slopes(finer[1]))
+        taps = flat.turned(turn) if by_finer else taps.on_deformed(displacement_mm[:, :2])
     return PlacedBins(
-        taps.on_deformed(displacement_mm[:, :2]),
+        taps,
         of(seen.log_change),
         of(seen.noise),
         of(seen.saturated),

@@ -58,6 +58,11 @@ class SlopeTaps:
         turn_taps(self.nodes, self.along, self.across, lateral_mm, _LEAST_AREA, along, across)
         return SlopeTaps(self.nodes, along, across)
 
+    def turned(self, turn: Array) -> SlopeTaps:
+        """The slopes times matrices (n, 2, 2)."""
+        along, across = np.einsum("nij,jnk->ink", turn, np.stack([self.along, self.across]))
+        return SlopeTaps(self.nodes, along, across)
+
     def turn(self, lateral_mm: Array) -> Array:
         """(n, 2, 2) F⁻ᵀ of `on_deformed`."""
         along, across = (self.slopes(lateral_mm[:, axis]) for axis in (0, 1))

@@ -21,6 +21,7 @@ from gelslim_force.contact.shading_change import LostColourError
 from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm, law_of
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator
+from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import JointForces
 from gelslim_force.joint.light_calibration import LightCalibration
@@ -38,7 +39,11 @@ from gelslim_force.tracking.marker_noise import noise_px
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.compliance.columns import SurfaceCompliance
-from ifem_export.compliance.finer_response import finer_response
+from ifem_export.compliance.finer_response import (
+    EndlessLayers,
+    finer_response,
+    half_step_response,
+)
 from ifem_export.errors import IfemError
 from ifem_export.markers.interpolation import marker_to_node
 from ifem_export.mesh.surface_lattice import neighbour_matrix, surface_share_mm2
@@ -195,6 +200,7 @@ def unknown_shape(
     if reference is not None:
         seen = _light_view(bundle, calibration, reference, lattice, light)
     # A linear gel is too soft by more than shadows matter, and they make up for a part of it.
+    finer = None if seen is None else _finer_pressure(bundle, lattice)
     bare = seen is None or gel == "linear"
     estimator = JointEstimator(
         points_mm,
@@ -215,7 +221,8 @@ def unknown_shape(
         strained_from_mm=deep_mm(bundle) if gel == "auto" else 0.0,
         relief=None if bare else NodeRelief.of(_traced(bundle), lattice, deep_mm(bundle)),
         deep_mm=math.inf if gel == "linear" else deep_mm(bundle),
-        finer=None if seen is None else FinerSurface.of(lattice, finer_response(bundle)),
+        finer=None if finer is None else finer.surface,
+        pressure=finer,
     )
     if seen is None:
         estimator = replace(
@@ -226,6 +233,12 @@ def unknown_shape(
     least = chosen.unseen_by_markers if seen is None else chosen.unseen_force
     unseen_n = least * bundle.material.youngs_modulus_mpa
     return UnknownShape(estimator, followed, unseen_n / layer_stiffness_n_mm(bundle))
+
+
+def _finer_pressure(bundle: Bundle, lattice: NodeLattice) -> FinerPressure:
+    layers = EndlessLayers.of(bundle)
+    surface = FinerSurface.of(lattice, finer_response(bundle, layers))
+    return FinerPressure.of(surface, half_step_response(bundle, layers))
 
 
 def _traced(bundle: Bundle) -> LightMap:
