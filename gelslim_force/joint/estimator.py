@@ -182,8 +182,7 @@ class JointEstimator:
         if slope > _HELD_SLOPE:
             return None
         # As in every round, residuals are those of the forces before it.
-        before = state.force_n[nodes].ravel() - data.start
-        return replace(found, markers=data.markers.after(before))
+        return replace(found, markers=data.markers.after(state.force_n[nodes].ravel() - data.start))
 
     def _settled(self, frame: FrameData, nodes: Mask, state: FitState) -> FitState:
         """A deep contact after as many more linearisations as it needs."""
@@ -194,12 +193,8 @@ class JointEstimator:
         return state
 
     def deepness(self, state: FitState) -> float:
+        """How deep the contact of an estimate is, from 0 to 1."""
         return deepness(state.near_mm, self.deep_mm)
-
-    @cached_property
-    def _mm_per_px(self) -> Array:
-        """(n,) of the markers at rest, the geometric mean over all directions."""
-        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.markers.mm_per_px))))
 
     @cached_property
     def _rigid(self) -> Array:
@@ -220,7 +215,7 @@ class JointEstimator:
 
     def _noise_mm(self, frame: FrameData) -> Array:
         """(n,) standard deviation of the markers' places on the gel by the noise of the image."""
-        return frame.noise_px * self._mm_per_px
+        return frame.noise_px * self.markers.mean_mm_per_px
 
     def _round(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
         """Linearise at the state, and solve."""
@@ -237,12 +232,10 @@ class JointEstimator:
         light, heights = self.light_sums(frame, near, moved, state), None
         if light is not None:
             heights = self.responses.of_heights(nodes, light.nodes)
-            gain = 1 - state.gain, self.settings.gain_sigma
-            data = data.with_light(light, heights, gain)
+            data = data.with_light(light, heights, (1 - state.gain, self.settings.gain_sigma))
         start, deep = state.force_n[nodes].ravel(), self.deepness(state)
-        return Linearised(
-            nodes, start, moved, offset, state.gain, deep, data, markers, light, heights
-        )
+        about = nodes, start, moved, offset, state.gain, deep
+        return Linearised(*about, data, markers, light, heights)
 
     def _solved(self, data: Linearised) -> FitState:
         """The forces that the linear data and the prior give."""
@@ -256,8 +249,7 @@ class JointEstimator:
             chosen.normal_stress * young,
             chosen.tangential_stress * young,
         )
-        found = equations.solved(data.start, chosen.friction)
-        force = np.zeros_like(self.points_mm)
+        force, found = np.zeros_like(self.points_mm), equations.solved(data.start, chosen.friction)
         force[nodes] = found.reshape(-1, 3)
         motion = GelMotion(self.responses, nodes, force[nodes], data.offset_mm)
         light, higher = data.light, data.heights_after(found)
@@ -272,8 +264,8 @@ class JointEstimator:
         depth = -float(state.near_mm.min(initial=0.0))
         if self.strained is None or depth <= self.strained_from_mm:
             return np.zeros_like(state.force_n)
-        whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
-        return np.asarray(state.displacement_mm - whole)
+        moved = state.displacement_mm
+        return np.asarray(moved - self.responses.compliance.whole(self.strained.force(moved)))
 
     def marker_rows(self, frame: FrameData, near: Mask, moved_mm: Array) -> MarkerRows:
         """The markers near the contact: lateral motion by the picture and the height.
@@ -281,8 +273,8 @@ class JointEstimator:
         What is not resolved: a share of the motion of all, and of each marker's `bending`.
         """
         chosen = self.settings
-        wide = self.lattice.widened(near, chosen.marker_reach)[self.marker_node]
-        used = np.flatnonzero(wide & frame.markers.known)
+        wide = self.lattice.widened(near, chosen.marker_reach)
+        used = np.flatnonzero(wide[self.marker_node] & frame.markers.known)
         model, bent = np.vsplit(self._to_markers @ moved_mm, 2)
         lateral = frame.markers.lateral(used, model[used, 2])
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
@@ -301,22 +293,21 @@ class JointEstimator:
     ) -> LightSums | None:
         """The change of light near the contact, linear about the present motion (c, 3).
 
-        It is by the heights of the nodes, or by those of the finer surface where they are given.
+        It is by the heights of the nodes, or those (f,) of the finer surface if they are given.
         """
         if self.light is None or self.law is None or frame.seen is None:
             return None
         wide = self.lattice.widened(near, self.settings.light_reach)
         relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
-        finer, by_finer = None, finer_mm is not None
+        finer, fine = None, finer_mm is not None
         if self.finer is not None:
-            held = (self.finer.lattice, finer_mm)
-            finer = held if by_finer else self.finer.seen(near, moved_mm, state.force_n)
+            finer = self.finer.seen(near, moved_mm, state.force_n, finer_mm)
         at = self.light, frame.seen, self.lattice, moved_mm, wide
-        bins = placed_bins(*at, relief, finer, by_finer)
+        bins = placed_bins(*at, relief, finer, by_finer=fine)
         chosen = settings_at(self.settings, self.deepness(state))
         error = math.hypot(chosen.light_error, chosen.light_share * rms_length(bins.change.T))
-        heights = finer_mm if by_finer else moved_mm[:, 2]
-        return bins.sums(self.law, heights, state.gain, error)
+        height = finer_mm if fine else moved_mm[:, 2]
+        return bins.sums(self.law, height, state.gain, error)
 
     @cached_property
     def _near_edge(self) -> Mask:
@@ -339,10 +330,8 @@ class JointEstimator:
             apparent *= min(-float(height.min(initial=0.0)) / self.deep_mm, 1.0)
             covariance += by_heights(by_marker, self.markers.mm_per_px, apparent)
         else:
-            force = state.force_n[nodes]
-            covariance += scaled_covariance(
-                state.equations.hessian, markers, sums, spread, force.ravel()
-            )
+            force, hessian = state.force_n[nodes], state.equations.hessian
+            covariance += scaled_covariance(hessian, markers, sums, spread, force.ravel())
             covariance += by_region(self._rigid, state.force_n, state.wider_n)
             covariance += self.off_design.by_camera(markers, spread, state.displacement_mm[:, 2])
             by_gel = self.off_design.by_parameter(markers, spread, nodes, force)

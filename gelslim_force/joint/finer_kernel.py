@@ -1,4 +1,4 @@
-"""Compiled steps of a fit of normal forces at half the pitch. Import only where they run (numba)."""
+"""Compiled steps of a fit of forces at half the pitch. Import only where they run (numba)."""
 
 from __future__ import annotations
 

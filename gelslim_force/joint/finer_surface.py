@@ -54,10 +54,14 @@ class FinerSurface:
         add_stencils(self.stencil, self.place[nodes], force, self.lattice.number, found)
         return found
 
-    def seen(self, near: Mask, moved_mm: Array, force_n: Array) -> tuple[NodeLattice, Array]:
+    def seen(
+        self, near: Mask, moved_mm: Array, force_n: Array, known_mm: Array | None = None
+    ) -> tuple[NodeLattice, Array]:
         """The finer lattice, and its heights by motion and forces (c, 3) of the nodes.
 
-        Forces count on the nodes `near` (c,) only.
+        Forces count on the nodes `near` (c,) only. Heights (f,) that are known are taken as such.
         """
+        if known_mm is not None:
+            return self.lattice, known_mm
         nodes = np.flatnonzero(near)
         return self.lattice, self.heights(moved_mm[:, 2], nodes, force_n[nodes])

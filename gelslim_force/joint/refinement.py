@@ -34,9 +34,7 @@ _SIZES = 2.0
 """Standard deviation of the pressure on a place over that on a node."""
 
 
-def refined(
-    estimator: JointEstimator, frame: FrameData, nodes: Nodes, state: FitState
-) -> FitState:
+def refined(estimator: JointEstimator, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
     """The estimate with normal forces at half the pitch; the same one without light.
 
     Its equations, and with them the covariance, remain those of forces on the nodes.
@@ -56,8 +54,8 @@ def refined(
     places = pressure.about(nodes)
     split = pressure.split[places]
     bearing = np.unique(np.concatenate([split.indices, nodes]))
-    near = np.zeros(len(state.force_n), dtype=bool)
-    near[bearing] = True
+    near = np.zeros((2, len(state.force_n)), dtype=bool)
+    near[0, nodes] = near[1, bearing] = True
 
     def on_nodes(normal: Array, tangential: Array) -> Array:
         force = np.zeros_like(state.force_n)
@@ -70,10 +68,10 @@ def refined(
     start, offset = on_nodes(normal, tangential), estimator.offset(state)
     moved = responses.displacement(bearing, start[bearing]) + offset
     height = pressure.heights(moved[:, 2], (nodes, tangential), (places, normal))
-    light = estimator.light_sums(frame, near, moved, state, height)
+    light = estimator.light_sums(frame, near[0], moved, state, height)
     assert light is not None
     heights = pressure.by_force(responses, light.nodes, nodes, places)
-    markers = estimator.marker_rows(frame, near, moved)
+    markers = estimator.marker_rows(frame, near[1], moved)
     rows = in_parts(markers.rows, split[:, bearing], np.searchsorted(bearing, nodes))
     gain = 1 - state.gain, estimator.settings.gain_sigma
     equations = NormalEquations.of(rows.shape[1])

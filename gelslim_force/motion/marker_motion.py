@@ -61,6 +61,11 @@ class MarkerView:
         return np.asarray(np.linalg.inv(self.camera.jacobian(self.rest_mm)), dtype=float)
 
     @cached_property
+    def mean_mm_per_px(self) -> Array:
+        """(n,) at rest, the geometric mean over all directions."""
+        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.mm_per_px))))
+
+    @cached_property
     def usual_mm_per_px(self) -> float:
         """Median over the markers of the length on the gel per length in the picture."""
         return float(np.median(np.sqrt(np.abs(np.linalg.det(self.mm_per_px)))))

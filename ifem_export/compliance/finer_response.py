@@ -123,7 +123,7 @@ def half_step_response(bundle: Bundle, layers: EndlessLayers | None = None) -> A
     found = np.empty((2, 2, 2 * REACH + 1, 2 * REACH + 1))
     for u, v in np.ndindex(2, 2):
         nodes = [(b, a) for a in range(u + 1) for b in range(v + 1)]
-        split = sum(np.roll(normal, node, axis=(0, 1)) for node in nodes) / len(nodes)
+        split = np.mean([np.roll(normal, node, axis=(0, 1)) for node in nodes], axis=0)
         smooth = np.roll(layers.interpolated(split), (-v, -u), axis=(0, 1))
         found[u, v] = _near(loaded - smooth)[..., 0]
     return found
