@@ -264,7 +264,7 @@ def unknown_source(
         bundle: The sensor.
         calibration: Its camera, and its markers at rest.
         reference: (h, w, 3) uint8 picture without contact; None for forces from the markers alone.
-        settings: Choose the law of the gel; the defaults if None.
+        settings: Choose the law of the gel and the pressure; the defaults if None.
         light: The light as built; None takes it as traced.
         more: As of `unknown_shape`.
 
@@ -286,8 +286,16 @@ def unknown_source(
             "with `gelslim build` or `gelslim bundle`",
         )
     calibration.require_bundle(bundle)
-    gel = "linear" if settings is None else settings.gel
-    return unknown_shape(bundle, calibration, reference, gel=gel, light=light, more=more)
+    chosen = settings or PipelineSettings()
+    return unknown_shape(
+        bundle,
+        calibration,
+        reference,
+        gel=chosen.gel,
+        finer_pressure=chosen.finer_pressure,
+        light=light,
+        more=more,
+    )
 
 
 def require_colour(bundle: Bundle) -> None:

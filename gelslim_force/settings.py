@@ -41,6 +41,9 @@ class PipelineSettings:
             apparent motion enters the covariance of the wrench.
         least_coverage: Smallest share of the markers seen with which a frame gives forces.
         drift: How drift of the camera against the gel is treated.
+        finer_pressure: Whether the forces of an object of unknown shape, by light and markers, are
+            fitted once more with normal forces at half the pitch of the nodes. It takes the common
+            bias off the normal force, and a frame takes more than twice as long.
         check_indenter: Whether a named indenter is compared with the forces of an unknown shape,
             where light and colour allow these.
 
@@ -58,6 +61,7 @@ class PipelineSettings:
     unknown_normal_mm: float = 0.3
     least_coverage: float = 0.3
     drift: DriftSettings = field(default_factory=DriftSettings)
+    finer_pressure: bool = False
     check_indenter: bool = True
 
     def __post_init__(self) -> None:

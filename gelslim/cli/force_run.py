@@ -230,6 +230,14 @@ Compensation = Annotated[
 ]
 Interpolation = Annotated[str, typer.Option(help="From markers to nodes: sparse or thin_plate.")]
 GelLaw = Annotated[str, typer.Option(help="Law of the gel: linear, neo_hookean or auto.")]
+FinerPressure = Annotated[
+    bool,
+    typer.Option(
+        "--finer-pressure",
+        help="Fit an unknown shape once more with normal forces at half the pitch of the nodes: "
+        "no common error, more than twice the time.",
+    ),
+]
 Friction = Annotated[float, typer.Option(min=0, help="Coefficient of Coulomb friction.")]
 Drift = Annotated[
     str,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -74,34 +73,14 @@ def test_the_stored_scores_keep_the_gate() -> None:
 
 
 def test_the_stored_scores_of_deep_contacts_hold() -> None:
-    """The deviations of F_x keep the gate but for 2 % of coverage; others may be too large."""
-    for law, row in _deep_record().items():
+    """The deviations of F_x and F_z keep the gate but for 2 % of coverage; F_y's are too large."""
+    deep = json.loads(STORED.read_text("utf-8"))["deep"]
+    assert set(deep) == {"linear", "auto"}
+    for law, row in deep.items():
         z = np.array(row["error_mn"]) / np.array(row["sigma_mn"])
         assert len(z) + row["refused"] >= 40
         rms, inside = np.sqrt((z**2).mean(axis=0)), (np.abs(z) < 1.96).mean(axis=0)
-        assert rms[0] > RMS[0], law
+        assert (rms[[0, 2]] > RMS[0]).all(), law
         assert (rms < RMS[1]).all(), law
         assert (inside > 0.88).all(), law
-    relative = {law: row["relative"]["normal"] for law, row in _deep_record().items()}
-    assert relative["auto"] < 0.5 * relative["linear"]
-
-
-@pytest.mark.parametrize(
-    "law",
-    [
-        "linear",
-        pytest.param("auto", marks=pytest.mark.xfail(strict=True, reason="two thirds as large")),
-    ],
-)
-def test_deviations_of_the_normal_force_of_deep_contacts_are_no_larger_than_errors(
-    law: str,
-) -> None:
-    row = _deep_record()[law]
-    z = np.array(row["error_mn"])[:, 2] / np.array(row["sigma_mn"])[:, 2]
-    assert np.sqrt((z**2).mean()) > RMS[0]
-
-
-def _deep_record() -> dict[str, Any]:
-    record = json.loads(STORED.read_text("utf-8"))["deep"]
-    assert set(record) == {"linear", "auto"}
-    return dict(record)
+    assert deep["auto"]["relative"]["normal"] < 0.5 * deep["linear"]["relative"]["normal"]

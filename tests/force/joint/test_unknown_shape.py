@@ -107,6 +107,22 @@ def test_the_next_frame_starts_from_the_last() -> None:
     assert (apart < 0.5 * first.wrench.standard_deviation).all()
 
 
+def test_a_finer_pressure_is_fitted_where_it_is_asked_for() -> None:
+    sensor, camera, rest = lit_bundle(), calibration(), reference().image
+    for asked in (False, True):
+        made = unknown_source(sensor, camera, rest, PipelineSettings(finer_pressure=asked))
+        assert (made.estimator.pressure is not None) == asked
+    source = unknown_shape(sensor, camera, rest, finer_pressure=True, settings=LINEAR_CAMERA)
+    truth = pressed(13)
+    finer = ForcePipeline(sensor, camera, normal=source).process(truth.image)
+    plain = processed(truth.image)
+    assert finer.wrench is not None
+    assert plain.wrench is not None
+    off = np.abs(finer.wrench.vector - truth.wrench)
+    assert (off < 3 * finer.wrench.standard_deviation).all()
+    assert abs(finer.wrench.force_n[2] - plain.wrench.force_n[2]) > 1e-4
+
+
 def test_no_contact_is_no_force() -> None:
     found = processed(shaded(camera=calibration().camera, seed=9).image)
     assert found.wrench is not None

@@ -56,6 +56,7 @@ def force(
     compensation: option.Compensation = "exact",
     interpolation: option.Interpolation = "sparse",
     gel: option.GelLaw = "linear",
+    finer_pressure: option.FinerPressure = False,
     friction: option.Friction = 1.0,
     drift: option.Drift = "correct",
     drift_px: option.DriftLimit = 0.5,
@@ -98,6 +99,7 @@ def force(
     chosen = {
         "operator": operator, "method": method, "compensation": compensation,
         "interpolation": interpolation, "gel": gel, "friction": friction,
+        "finer_pressure": finer_pressure,
         "drift": drift, "drift_px": drift_px, "rezero": rezero,
     }  # fmt: skip
     settings = _settings(chosen, budget)
@@ -180,6 +182,7 @@ def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
             compensation=chosen["compensation"],
             interpolation=chosen["interpolation"],
             gel=chosen["gel"],
+            finer_pressure=chosen["finer_pressure"],
             force=ForceSettings(method=chosen["method"], friction=chosen["friction"]),
             drift=DriftSettings(
                 correct=chosen["drift"] == "correct",
