@@ -124,9 +124,12 @@ def all_chains(
     loose = PipelineSettings(budget=Budget(error=LOOSE))
     # The rig draws grey values in proportion to the light.
     drawn = JointSettings(gamma=1.0)
-    anything = unknown_shape(rig.bundle, calibration, frames[0], settings=drawn)
-    chain = ForcePipeline(rig.bundle, calibration, None, anything)
-    yield "any object", pipeline_chain(chain, frames, clock)
+    for suffix, finer in (("", False), (", finer pressure", True)):
+        anything = unknown_shape(
+            rig.bundle, calibration, frames[0], finer_pressure=finer, settings=drawn
+        )
+        chain = ForcePipeline(rig.bundle, calibration, None, anything)
+        yield f"any object{suffix}", pipeline_chain(chain, frames, clock)
     for suffix, settings in (("", None), (f", {LOOSE:.0%}", loose)):
 
         def opened(
