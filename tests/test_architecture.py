@@ -52,8 +52,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "pipeline", "built_sensor", "sensor", "run",
     ),
     "gelslim_twin": (
-        "effects", "scene", "planning", "contact", "render", "appearance", "simulation", "batch",
-        "datasets", "stepping", "validation",
+        "effects", "scene", "planning", "tools", "contact", "render", "appearance", "simulation",
+        "batch", "datasets", "stepping", "validation",
     ),
     "gelslim_cad": (
         "spec", "gel", "markers", "pictures", "geometry", "light", "electronics", "dimensions",

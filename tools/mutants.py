@@ -59,6 +59,7 @@ PHYSICS = (
     "gelslim_force/tracking/*noise*.py",
     "gelslim_twin/planning/planner.py",
     "gelslim_twin/effects/*.py",
+    "gelslim_twin/tools/*.py",
     "gelslim_twin/contact/*.py",
 )
 """Modules whose formulas are mutated."""

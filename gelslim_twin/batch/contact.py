@@ -29,7 +29,7 @@ from gelslim_twin.contact.plane_iteration import (
     gap_tolerance_mm,
 )
 from gelslim_twin.contact.solver import CANDIDATE_SHARE, GROWTH_STEPS, Geometry
-from gelslim_twin.contact.tool import Tool
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]

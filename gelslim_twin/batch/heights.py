@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gelslim_twin.batch.engine import Engine, Tensor
-from gelslim_twin.contact.profile import (
+from gelslim_twin.tools.profile import (
     NEGLIGIBLE,
     RIM_MM,
     BallProfile,
@@ -19,8 +19,8 @@ from gelslim_twin.contact.profile import (
     HeightMap,
     Profile,
 )
-from gelslim_twin.contact.profile_kernel import LEVEL
-from gelslim_twin.contact.tool import Tool
+from gelslim_twin.tools.profile_kernel import LEVEL
+from gelslim_twin.tools.tool import Tool
 
 Heights = Callable[[Tensor, Tensor], Tensor]
 """Height in mm at points x and y of any shape; infinite outside the shape."""

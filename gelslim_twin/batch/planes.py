@@ -1,6 +1,6 @@
 """Tangent planes of a tool at many points of many poses.
 
-The same geometry as `gelslim_twin.contact.tool` for one pose, with b poses of one tool at once.
+The same geometry as `gelslim_twin.tools.tool` for one pose, with b poses of one tool at once.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 
 from gelslim_twin.batch.engine import Engine, Tensor
 from gelslim_twin.batch.heights import Heights, tool_heights
-from gelslim_twin.contact.tool import VERTICAL_STEPS, Tool
-from gelslim_twin.contact.tool_kernel import (
+from gelslim_twin.tools.tool import VERTICAL_STEPS, Tool
+from gelslim_twin.tools.tool_kernel import (
     BENT,
     DIFFERENCE_MM,
     LEAST_SLOPE,
@@ -173,7 +173,7 @@ class PlacedTool:
         return lost
 
     def _past_walls(self, last: Tensor, now: Tensor, height: Tensor) -> Tensor:
-        """As `gelslim_twin.contact.tool._past_walls`, for points (k, 3) and (k, 2)."""
+        """As `gelslim_twin.tools.tool._past_walls`, for points (k, 3) and (k, 2)."""
         torch = self.engine.torch
         a, b, low, high = last[:, :2], now, last[:, 2], height
         far = (b - a).norm(dim=1)

@@ -23,9 +23,9 @@ from gelslim_twin.contact.gel_body import GelBody, Tangent
 from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState, TouchedNodes
 from gelslim_twin.contact.plane_iteration import allowed_motion_mm, gap_tolerance_mm
 from gelslim_twin.contact.solver import CANDIDATE_SHARE, ContactSolver
-from gelslim_twin.contact.tool import ToolSurface
-from gelslim_twin.contact.tool_group import members_of
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import ToolSurface
+from gelslim_twin.tools.tool_group import members_of
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 
 Array = NDArray[np.float64]

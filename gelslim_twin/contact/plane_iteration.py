@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.contact_forces import ContactForces, solve_contact_forces
 from gelslim_twin.contact.gel_state import ContactError
-from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool, ToolSurface
 from ifem_export.compliance.pad_compliance import NodeCompliance
 
 Array = NDArray[np.float64]

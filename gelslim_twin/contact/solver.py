@@ -43,8 +43,8 @@ from gelslim_twin.contact.plane_iteration import (
     allowed_motion_mm,
     gap_tolerance_mm,
 )
-from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool, ToolSurface
 from ifem_export.compliance.pad_compliance import NodeCompliance, SurfaceResponse
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ CARRIED = 0.25
 """Way of the tool in one step, over the pitch of the nodes, up to which it carries what sticks."""
 Geometry = Literal["displaced", "rest"]
 REST_FROM = 0.4
-"""Poisson's ratio from which the geometry at rest is nearer (bench/linear_gel.py)."""
+"""Poisson's ratio from which the geometry at rest is nearer (bench/twin/linear_gel.py)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,8 @@ from gelslim_twin.simulation.scene_task import require_no_undercut
 from gelslim_twin.simulation.sensor import TwinSensor, stored_sensor
 
 if TYPE_CHECKING:
-    from gelslim_twin.contact.tool import Tool
     from gelslim_twin.simulation.picture import Viewer
+    from gelslim_twin.tools.tool import Tool
     from ifem_export.compliance.pad_compliance import PadCompliance
 
 KEPT_TOOLS = 64
@@ -171,7 +171,7 @@ class SampleMaker:
             yield when, pose.blended(later, when.part), first.blended(now, when.part)
 
     def _made_tool(self, indenters: Any, seed: int) -> Tool:
-        from gelslim_twin.contact.tool import Tool
+        from gelslim_twin.tools.tool import Tool
 
         return Tool.of(indenters, self.job.loaded.folder, seed)
 

@@ -29,7 +29,6 @@ from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.contact.prony import PronySeries
 from gelslim_twin.contact.relaxation import at_rest, relax
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.circumstances import MotionFigures, Probed
 from gelslim_twin.effects.contact import RIM_NODES, RIM_PLACES, RelaxationParameters
 from gelslim_twin.effects.effect import Bound, geometry, picture, rounded_up
@@ -38,6 +37,7 @@ from gelslim_twin.planning.planner import Question
 from gelslim_twin.planning.probing import MOTION_BLUR, probed_poses
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.markers.interpolation import marker_to_node
 from ifem_export.operators.single_thread import single_threaded

@@ -15,7 +15,7 @@ from gelslim_twin.simulation.simulate import Mechanics
 
 if TYPE_CHECKING:
     from gelslim_twin.contact.prony import PronySeries
-    from gelslim_twin.contact.tool import Tool
+    from gelslim_twin.tools.tool import Tool
     from ifem_export.compliance.pad_compliance import PadCompliance
 
 CONTACTS = {
@@ -72,7 +72,7 @@ def mechanics_of(
         friction = contact_friction(loaded.scene.contact, None if skin is None else skin.friction)
     settings = solver.ContactSettings(tolerance, friction)
     if tool is None:
-        from gelslim_twin.contact.tool import Tool
+        from gelslim_twin.tools.tool import Tool
 
         tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
     contact: Any

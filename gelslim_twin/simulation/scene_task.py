@@ -178,7 +178,7 @@ def require_no_undercut(loaded: LoadedScene, sensor: TwinSensor) -> None:
     for index, indenter in enumerate(loaded.scene.indenters):
         if not isinstance(indenter, MeshFile):
             continue
-        from gelslim_twin.contact.undercut import undercut_of_file
+        from gelslim_twin.tools.undercut import undercut_of_file
 
         hidden = undercut_of_file(indenter, loaded.folder)
         if hidden is None:

@@ -18,8 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.soft_layer import SoftLayer
-from gelslim_twin.contact.tool import Tool
-from gelslim_twin.contact.undercut import Undercut
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.stepping.body_shape import (
     BallShape,
@@ -30,6 +28,8 @@ from gelslim_twin.stepping.body_shape import (
 )
 from gelslim_twin.stepping.closed_mesh import read_closed_mesh
 from gelslim_twin.stepping.step_error import StepError
+from gelslim_twin.tools.tool import Tool
+from gelslim_twin.tools.undercut import Undercut
 
 Array = NDArray[np.float64]
 GRID_DEG = 9.0

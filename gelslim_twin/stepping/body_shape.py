@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.profile import ConvexProfile, Profile, mesh_profile, profile
-from gelslim_twin.contact.undercut import Undercut, undercut_of
 from gelslim_twin.scene.indenter import Indenter, MeshFile, Sphere
 from gelslim_twin.stepping.step_error import StepError
+from gelslim_twin.tools.profile import ConvexProfile, Profile, mesh_profile, profile
+from gelslim_twin.tools.undercut import Undercut, undercut_of
 
 Array = NDArray[np.float64]
 EXACT_MM = 1e-3

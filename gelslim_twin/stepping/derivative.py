@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from gelslim_twin.contact.contact_forces import STICK
 from gelslim_twin.contact.gel_state import AnchoredState, StickTargets
 from gelslim_twin.contact.solver import Geometry
-from gelslim_twin.contact.tool_group import members_of
 from gelslim_twin.scene.rotation import rotation
 from gelslim_twin.stepping.placement import Placement
+from gelslim_twin.tools.tool_group import members_of
 from ifem_export.operators.adjoint_fields import resultants
 
 Array = NDArray[np.float64]

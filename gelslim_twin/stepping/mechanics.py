@@ -19,7 +19,6 @@ from gelslim_twin.contact.solver import (
     Geometry,
     geometry_of,
 )
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.circumstances import EffectParameters
 from gelslim_twin.effects.contact import NEWTON_RUNGS, RelaxationParameters
 from gelslim_twin.effects.contact_estimate import (
@@ -33,6 +32,7 @@ from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.placement import Placement
 from gelslim_twin.stepping.request import Request
 from gelslim_twin.stepping.step_error import StepError
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.soft_layer import SoftLayer
-from gelslim_twin.contact.tool import Tool
-from gelslim_twin.contact.tool_group import GroupPose, ToolGroup, members_of
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.stepping.body import Body, Side
 from gelslim_twin.stepping.rigid_motion import tool_pose
 from gelslim_twin.stepping.step_error import StepError
+from gelslim_twin.tools.tool import Tool
+from gelslim_twin.tools.tool_group import GroupPose, ToolGroup, members_of
 
 Array = NDArray[np.float64]
 

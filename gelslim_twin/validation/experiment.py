@@ -18,9 +18,9 @@ from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact, unfit
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cylinder, FlatPunch, Indenter, Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.mesh.pad_mesh import PadMesh

@@ -25,9 +25,9 @@ from contact_pads import YOUNGS_MPA, small_pad
 from gelslim_twin.contact.gel_body import GelBody
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.bundle import build_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.elements.material import Material

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.rotation import rotation
+from gelslim_twin.tools.tool import Tool
 
 Array = NDArray[np.float64]
 _ABOVE_MM = 1.0

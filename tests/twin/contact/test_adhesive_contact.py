@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.adhesive_contact import AdhesiveContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch, Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ from tool_height import tool_height_mm
 from gelslim_twin.contact.contact_forces import FREE, SLIP, STICK, solve_contact_forces
 from gelslim_twin.contact.coulomb_kernel import node_force
 from gelslim_twin.contact.gel_state import ContactError
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, Cylinder, FlatPunch, Indenter, Ring, Sphere, Wedge
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 
 Array = NDArray[np.float64]
 SHAPES: dict[str, Indenter] = {

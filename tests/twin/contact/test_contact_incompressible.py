@@ -13,9 +13,9 @@ from tool_height import tool_height_mm
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.elements.material import Material
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad

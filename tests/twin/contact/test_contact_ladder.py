@@ -16,9 +16,9 @@ from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch, Indenter, Ring, Sphere, TexturedPlane
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.bundle import build_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.elements.material import Material

@@ -15,9 +15,9 @@ from gelslim_twin.contact.contact_forces import solve_contact_forces
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 

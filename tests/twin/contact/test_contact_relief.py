@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from sampled import quick
 
-from gelslim_twin.contact.profile import mesh_file_profile
 from gelslim_twin.scene.indenter import Stl
+from gelslim_twin.tools.profile import mesh_file_profile
 
 trimesh = pytest.importorskip(
     "trimesh", reason="trimesh is not installed: height maps of STL files are NOT checked"

@@ -18,9 +18,9 @@ from gelslim_twin.contact.solver import (
     even_steps,
     with_halved_steps,
 )
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, FlatPunch, Indenter, Ring, Sphere, Wedge
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 

@@ -10,7 +10,6 @@ from contact_pads import small_pad
 
 from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -22,6 +21,7 @@ from gelslim_twin.scene.indenter import (
     Wedge,
 )
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 SHAPES: dict[str, Indenter] = {

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from sampled import quick
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -24,6 +23,7 @@ from gelslim_twin.scene.indenter import (
 )
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.rotation import rotation
+from gelslim_twin.tools.tool import Tool, ToolSurface
 
 Array = NDArray[np.float64]
 SHAPES: dict[str, Indenter] = {

@@ -13,9 +13,9 @@ from sampled import quick
 
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, Cylinder, FlatPunch, Indenter, Ring
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 PUNCH = FlatPunch(shape="flat_punch", length_mm=4, width_mm=4)

@@ -15,12 +15,12 @@ from gelslim_core.yaml.errors import InputError
 from gelslim_twin.contact.fine_contact import FineContact
 from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cylinder, FlatPunch, Indenter, Sphere, TexturedPlane
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance import table_size

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from gelslim_twin.contact.gel_state import AnchoredState, GelState, anchor_mm
 from gelslim_twin.contact.solver import Candidates, ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch, Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ from gelslim_twin.contact.gel_state import ContactStatus
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]

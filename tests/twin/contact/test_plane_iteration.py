@@ -18,9 +18,9 @@ from gelslim_twin.contact.plane_iteration import (
     allowed_motion_mm,
     gap_tolerance_mm,
 )
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 
 Array = NDArray[np.float64]
 RADIUS_MM, POSE = 4.0, Pose(x_mm=0.3, y_mm=-0.2, depth_mm=0.5)

@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.contact.sliding_friction import SlidingContact, SlidingLaw, mean_slip_mm_s
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]

@@ -13,9 +13,9 @@ from gelslim_twin.contact.contact_forces import ContactForces
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.plane_iteration import PlaneIteration
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 DEPTH_MM, WAY_MM, TURN_DEG, DOWN, STEPS = 0.25, 1.2, 8.0, 5, 30

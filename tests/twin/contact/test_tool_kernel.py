@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gelslim_twin.contact.profile_kernel import arc_heights, convex_heights
-from gelslim_twin.contact.tool_kernel import MOST_SLOPE, central_slope, node_frames
+from gelslim_twin.tools.profile_kernel import arc_heights, convex_heights
+from gelslim_twin.tools.tool_kernel import MOST_SLOPE, central_slope, node_frames
 
 
 def test_a_slope_at_a_rim_and_at_a_wall() -> None:

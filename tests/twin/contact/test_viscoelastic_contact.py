@@ -15,10 +15,10 @@ from gelslim_twin.contact.fine_contact import FineContact
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.prony import PronySeries
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.contact.viscoelastic_contact import ViscoelasticContact
 from gelslim_twin.scene.indenter import FlatPunch, Indenter, Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.compliance.convolved import ConvolvedCompliance
 

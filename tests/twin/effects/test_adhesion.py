@@ -15,7 +15,6 @@ from sim_rig import small_sensor, written_scene
 from gelslim_core.yaml.errors import InputError
 from gelslim_twin.contact.adhesive_contact import AdhesiveContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.adhesion import (
     ADHESION,
     AdhesionParameters,
@@ -31,6 +30,7 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import TwinSensor
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 

@@ -19,7 +19,6 @@ from gelslim_cad.tolerance.asked import read_spec
 from gelslim_core.yaml.errors import InputError
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.circumstances import Circumstances, MotionFigures
 from gelslim_twin.effects.effect import Bound
 from gelslim_twin.effects.skin import SKIN, skin_bound
@@ -30,6 +29,7 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import TwinSensor
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.files import load_bundle, write_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.elements.skin import Membrane, Skin

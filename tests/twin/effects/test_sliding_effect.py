@@ -16,7 +16,6 @@ from gelslim_core.yaml.errors import InputError
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.sliding_friction import SlidingContact, SlidingLaw
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.sliding_friction import (
     SLIDING_FRICTION,
@@ -32,6 +31,7 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import TwinSensor
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 

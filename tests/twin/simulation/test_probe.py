@@ -16,7 +16,6 @@ from gelslim_twin.contact.corrected_contact import CorrectedContact
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.contact import convergence_ms
 from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.probing import MOST_POSES, MOST_SHARE, effects_to_probe, probed_poses
@@ -25,6 +24,7 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.probe import probed
 from gelslim_twin.simulation.scene_task import planned
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from stepping_rig import DT_S, LINEAR, Array, at, box_facets, linear_twin, turned, write_stl
 
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch, Sphere, Wedge
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.stepping.body import Body
@@ -18,6 +17,7 @@ from gelslim_twin.stepping.request import Request
 from gelslim_twin.stepping.rigid_motion import motion_of
 from gelslim_twin.stepping.step_error import StepError
 from gelslim_twin.stepping.twin import Twin
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 

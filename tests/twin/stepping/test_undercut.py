@@ -21,12 +21,12 @@ from stepping_rig import (
 )
 
 from gelslim_core.yaml.errors import InputError
-from gelslim_twin.contact.profile import lowest_middle
-from gelslim_twin.contact.undercut import undercut_of
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.scene_task import require_no_undercut
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.step_error import StepError
+from gelslim_twin.tools.profile import lowest_middle
+from gelslim_twin.tools.undercut import undercut_of
 
 GAP_MM, FOOT_MM = 0.4, 0.5
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelslim_twin.contact.profile_kernel import arc_heights, convex_heights
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -25,6 +24,7 @@ from gelslim_twin.scene.indenter import (
     Wedge,
 )
 from gelslim_twin.scene.mesh_file import mesh_corners
+from gelslim_twin.tools.profile_kernel import arc_heights, convex_heights
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array, Array], Array]
@@ -273,7 +273,7 @@ def _down(corners: Array, direction: str) -> Array:
 
 def _lowest(corners: Array, x: Array, y: Array) -> Array:
     """Lowest height (nx, ny) of the facets over the grid's points; infinite where there is none."""
-    from gelslim_twin.contact.height_map_kernel import lower_heights
+    from gelslim_twin.tools.height_map_kernel import lower_heights
 
     height = np.full((len(x), len(y)), np.inf)
     lower_heights(np.ascontiguousarray(corners), x, y, height)

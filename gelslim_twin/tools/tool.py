@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.profile import Profile, profile
-from gelslim_twin.contact.tool_kernel import (
+from gelslim_twin.scene.indenter import Indenter
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.rotation import rotation
+from gelslim_twin.tools.profile import Profile, profile
+from gelslim_twin.tools.tool_kernel import (
     DIFFERENCE_MM,
     MOST_SLOPE,
     ROUNDING_MM,
@@ -19,9 +22,6 @@ from gelslim_twin.contact.tool_kernel import (
     paths_to_walls,
     tangent_planes,
 )
-from gelslim_twin.scene.indenter import Indenter
-from gelslim_twin.scene.pose import Pose
-from gelslim_twin.scene.rotation import rotation
 
 Array = NDArray[np.float64]
 VERTICAL_STEPS = 2

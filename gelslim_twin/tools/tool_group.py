@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.tool import Array, Tool, ToolSurface
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Array, Tool, ToolSurface
 
 NOBODY = -1
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.profile import facets_down, lowest_middle
 from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.rotation import rotation
+from gelslim_twin.tools.profile import facets_down, lowest_middle
 
 Array = NDArray[np.float64]
 POINTS = 256
@@ -138,7 +138,7 @@ def _undercut_of_file(shape: MeshFile, folder: Path, changed_ns: int, size: int)
 def _passes(
     corners: Array, x: Array, y: Array
 ) -> tuple[NDArray[np.intp], Array, NDArray[np.intp], NDArray[np.intp]]:
-    from gelslim_twin.contact.height_map_kernel import vertical_passes
+    from gelslim_twin.tools.height_map_kernel import vertical_passes
 
     facets, room = np.ascontiguousarray(corners), 0
     while True:

@@ -1,0 +1,1 @@
+"""Rigid tools at a pose: shapes, height over the gel, walls, undercuts, several at once."""
