@@ -49,10 +49,10 @@ stability: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.stability.run --count 300
 
 bench: $(VENV)/.installed-peers
-	$(BIN)/python bench/run_all.py
+	$(BIN)/python -m bench.run_all
 
 bench-quick: $(VENV)/.installed-dev
-	$(BIN)/python bench/run_all.py --quick
+	$(BIN)/python -m bench.run_all --quick
 
 docs: $(VENV)/.installed-dev
 	$(BIN)/gelslim schema -o docs/gelslim-spec-1.schema.json
@@ -61,9 +61,9 @@ docs: $(VENV)/.installed-dev
 	$(BIN)/gelslim schema --markdown -o docs/spec_reference.md
 	$(BIN)/gelslim schema --scene --markdown -o docs/scene_reference.md
 	$(BIN)/gelslim schema --sensor --markdown -o docs/sensor_reference.md
-	$(BIN)/python bench/accuracy_page.py
+	$(BIN)/python -m bench.accuracy_page
 	$(BIN)/python tools/sensitivities.py
-	$(BIN)/python bench/page_blocks.py
+	$(BIN)/python -m bench.page_blocks
 	$(BIN)/python tools/gallery.py
 	$(MAKE) site
 

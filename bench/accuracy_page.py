@@ -1,8 +1,8 @@
 """Make the page of all ladders, with its figures, from the JSON files of the benches.
 
-    python bench/accuracy_page.py              # from docs/data to docs
-    python bench/accuracy_page.py --docs D     # from D/data to D
-    python bench/accuracy_page.py --check      # writes nothing; fails if the page is out of date
+    python -m bench.accuracy_page              # from docs/data to docs
+    python -m bench.accuracy_page --docs D     # from D/data to D
+    python -m bench.accuracy_page --check      # writes nothing; fails if the page is out of date
 
 Writes accuracy_vs_time.md, images/accuracy_*.png and data/accuracy.json, which holds every ladder
 in one form. A ladder whose bench has not been run yet is named as missing.
@@ -17,16 +17,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bench_data import DOCS, write_data, write_whole
-from page import accuracy_text
-from page.accuracy_figure import drawn
-from page.accuracy_text import conclusion, table
-from page.ladder_record import LadderRecord, records_of
-from page.ladders_of_camera import camera
-from page.ladders_of_force import force
-from page.ladders_of_solids import light, stiffness, tessellation
-from page.ladders_of_sources import sources
-from page.ladders_of_twin import rendering, twin
+from bench.bench_data import DOCS, write_data, write_whole
+from bench.page import accuracy_text
+from bench.page.accuracy_figure import drawn
+from bench.page.accuracy_text import conclusion, table
+from bench.page.ladder_record import LadderRecord, records_of
+from bench.page.ladders_of_camera import camera
+from bench.page.ladders_of_force import force
+from bench.page.ladders_of_solids import light, stiffness, tessellation
+from bench.page.ladders_of_sources import sources
+from bench.page.ladders_of_twin import rendering, twin
 
 Convert = Callable[[Mapping[str, Any], Mapping[str, Any]], list[LadderRecord]]
 SOURCES: dict[str, Convert] = {
@@ -62,7 +62,7 @@ CLOSING = """\
     make bench          # measures every ladder in full and then makes this page
     make bench-quick    # measures all at reduced size into out/bench, in under five minutes
 
-`python bench/accuracy_page.py` makes text, tables and figures from the JSON files in `docs/data`.
+`python -m bench.accuracy_page` makes text, tables and figures from the JSON files in `docs/data`.
 `docs/data/accuracy.json` holds all ladders in one form. Tests compare this page with these files,
 and the files with limits on errors and operation counts; no test depends on a time.
 """
@@ -81,7 +81,7 @@ def main() -> None:
     if asked.check:
         path = asked.docs / PAGE
         if not path.exists() or path.read_text(encoding="utf-8") != text:
-            sys.exit(f"{path} is out of date: run python bench/accuracy_page.py")
+            sys.exit(f"{path} is out of date: run python -m bench.accuracy_page")
         return
     for ladder in ladders:
         write_whole(asked.docs / picture(ladder), drawn(ladder))

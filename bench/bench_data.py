@@ -7,7 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-DOCS = Path(__file__).parents[1] / "docs"
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 
 
 def write_data(name: str, data: dict[str, Any], docs: Path = DOCS) -> Path:

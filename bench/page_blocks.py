@@ -1,7 +1,7 @@
 """Fill the blocks of the pages that are made from docs/data or by the program.
 
-    python bench/page_blocks.py            # fill the blocks of every page
-    python bench/page_blocks.py --check    # write nothing; exit status 1 if a page is out of date
+    python -m bench.page_blocks            # fill the blocks of every page
+    python -m bench.page_blocks --check    # write nothing; exit status 1 if a page is out of date
 
 A block stands between the comments `<!-- name -->` and `<!-- /name -->`. `PAGES` says which
 function makes which block. `docs/accuracy_vs_time.md` is generated as a whole by accuracy_page.py.
@@ -17,18 +17,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import data_set_cost
-import force_sigma
-import learned_forces
-import linear_gel
-import real_locations
-import twin_batch
-import twin_fine
-import twin_look
-import twin_skin
-import twin_steps
-from bench_data import DOCS, write_whole
-from page import (
+from bench.bench_data import DOCS, ROOT, write_whole
+from bench.force import force_sigma
+from bench.learning import data_set_cost, learned_forces, real_locations
+from bench.page import (
     drawn_light_table,
     force_tables,
     page_tables,
@@ -36,8 +28,8 @@ from page import (
     tolerance_tables,
     twin_tables,
 )
+from bench.twin import linear_gel, twin_batch, twin_fine, twin_look, twin_skin, twin_steps
 
-ROOT = DOCS.parent
 sys.path.insert(0, str(ROOT / "tools"))
 Make = Callable[[], str]
 
@@ -173,7 +165,7 @@ def main() -> None:
         return
     old = [n for n, blocks in PAGES.items() if _differs(ROOT / n, blocks)]
     if old:
-        sys.exit(f"out of date: {', '.join(old)}; run: python bench/page_blocks.py")
+        sys.exit(f"out of date: {', '.join(old)}; run: python -m bench.page_blocks")
 
 
 def _differs(path: Path, blocks: Mapping[str, Make]) -> bool:

@@ -1,8 +1,8 @@
 """Run every bench, one after the other, then make the page of all ladders.
 
-    python bench/run_all.py                     # in full, writes docs/data, images and the page
-    python bench/run_all.py --quick             # at reduced size into out/bench, under 5 minutes
-    python bench/run_all.py --only light_rays   # that one and the page
+    python -m bench.run_all                             # in full: docs/data, images and the page
+    python -m bench.run_all --quick                     # reduced, into out/bench, under 5 minutes
+    python -m bench.run_all --only optics.light_rays    # that one and the page
 
 A bench that fails is named at the end and leaves its old numbers; the exit code is then 1. One
 thread each, and never two at once: they would take each other's time.
@@ -18,9 +18,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench_data import DOCS
+from bench.bench_data import DOCS
 
-HERE = Path(__file__).parent
 QUICK_DOCS = Path("out") / "bench"
 QUICK_MOST_S = 300.0
 
@@ -37,33 +36,37 @@ class Step:
 
 
 STEPS = (
-    Step("stiffness_ladder"),
-    Step("operator_contacts"),
-    Step("light_rays", quick=("--rays", "12", "--reference", "18", "--ladder-alone")),
-    Step("tessellation"),
-    Step("camera_models"),
-    Step("force_ladders"),
-    Step("normal_sources"),
-    Step("force_sigma", quick=None),
-    Step("twin_ladders"),
-    Step("twin_planning"),
-    Step("twin_steps"),
-    Step("twin_batch"),
-    Step("twin_fine"),
-    Step("learned_forces", quick=None),
-    Step("robot_observation", quick=None, writes=False),
-    Step("press_slip", quick=None, writes=False),
-    Step("twin_skin"),
-    Step("linear_gel"),
-    Step("twin_look", quick=None, writes=False),
-    Step("rendering"),
-    Step("assembly"),
-    Step("force_latency", ("--frames", "3000"), ("--quick", "--timed", "96")),
-    Step("refraction", quick=("--points", "100000", "--runs", "3"), writes=False),
-    Step("design_batch", quick=("--count", "500", "--jobs", "1", "--repeats", "1"), writes=False),
-    Step("force_overlay", quick=None, writes=False),
-    Step("stiffness_cases", quick=None),
-    Step("tolerance_yields", quick=("--samples", "256")),
+    Step("stiffness.stiffness_ladder"),
+    Step("stiffness.operator_contacts"),
+    Step("optics.light_rays", quick=("--rays", "12", "--reference", "18", "--ladder-alone")),
+    Step("designs.tessellation"),
+    Step("optics.camera_models"),
+    Step("force.force_ladders"),
+    Step("force.normal_sources"),
+    Step("force.force_sigma", quick=None),
+    Step("twin.twin_ladders"),
+    Step("twin.twin_planning"),
+    Step("twin.twin_steps"),
+    Step("twin.twin_batch"),
+    Step("twin.twin_fine"),
+    Step("learning.learned_forces", quick=None),
+    Step("force.robot_observation", quick=None, writes=False),
+    Step("force.press_slip", quick=None, writes=False),
+    Step("twin.twin_skin"),
+    Step("twin.linear_gel"),
+    Step("twin.twin_look", quick=None, writes=False),
+    Step("twin.rendering"),
+    Step("stiffness.assembly"),
+    Step("force.force_latency", ("--frames", "3000"), ("--quick", "--timed", "96")),
+    Step("optics.refraction", quick=("--points", "100000", "--runs", "3"), writes=False),
+    Step(
+        "designs.design_batch",
+        quick=("--count", "500", "--jobs", "1", "--repeats", "1"),
+        writes=False,
+    ),
+    Step("force.force_overlay", quick=None, writes=False),
+    Step("stiffness.stiffness_cases", quick=None),
+    Step("designs.tolerance_yields", quick=("--samples", "256")),
     Step("page_blocks", quick=None, writes=False),
 )
 PAGE = "accuracy_page"
@@ -108,7 +111,7 @@ def ran(name: str, arguments: tuple[str, ...]) -> bool:
     """Run one bench on one thread; whether it succeeded."""
     print(f"== {name} {' '.join(arguments)}", flush=True)
     begun = time.perf_counter()
-    command = [sys.executable, str(HERE / f"{name}.py"), *arguments]
+    command = [sys.executable, "-m", f"bench.{name}", *arguments]
     code = subprocess.run(command, env={"OMP_NUM_THREADS": "1", **os.environ}).returncode
     print(f"== {name}: {time.perf_counter() - begun:.0f} s", flush=True)
     return code == 0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
+from bench.bench_data import ROOT
 from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.optics import curved_guide, gel_section, straight_guide
@@ -25,7 +25,7 @@ from gelslim_optics.light.scene import LightScene, Surface
 from gelslim_optics.light.source import LedRow
 from gelslim_optics.light.trace import trace_light
 
-SPEC = Path(__file__).parents[2] / "designs" / "gelslim2.yaml"
+SPEC = ROOT / "designs" / "gelslim2.yaml"
 RAYS = 1 << 16
 QUANTITIES = ("arrived", "entered_gel")
 RATIOS = (0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0)

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.models.facets import facetted_profile
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
 from gelslim_optics.light.scene import LightScene
 from gelslim_optics.light.source import LedRow
-from models.facets import facetted_profile
 
 Array = NDArray[np.float64]
 Faces = tuple[Array, NDArray[np.int64]]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from bench.models.thin_lens import GOLDEN, ThinLens
 from gelslim_cad.dimensions import Dimensions
-from models.thin_lens import GOLDEN, ThinLens
 
 Array = NDArray[np.float64]
 SEPARATION, PUPIL, DISTORTION = 0.10, 0.05, -0.015

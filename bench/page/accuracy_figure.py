@@ -8,7 +8,7 @@ import json
 import math
 from typing import Any
 
-from page.ladder_record import LadderRecord, RungRecord
+from bench.page.ladder_record import LadderRecord, RungRecord
 
 SIZE_IN, DPI = (8.5, 5.4), 110
 COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57", "#7a3f8f", "#b59b00", "#30a0b0", "#c03060", "#7f7f7f",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from page.ladder_record import LadderRecord, RungRecord
+from bench.page.ladder_record import LadderRecord, RungRecord
 
 MOST_ROWS = 9
 SEEN_PX = 0.05

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from page.ladder_record import ErrorUnit, LadderRecord, RungRecord
+from bench.page.ladder_record import ErrorUnit, LadderRecord, RungRecord
 
 Data = Mapping[str, Any]
 KNOWN = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from page.ladder_record import LadderRecord, RungRecord
+from bench.page.ladder_record import LadderRecord, RungRecord
 
 Data = Mapping[str, Any]
 OURS_DETECTOR, OURS_MATCHING = "near predictions", "robust"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bench.page.ladder_record import LadderRecord, RungRecord
 from gelslim_cad.light.study import RAYS
 from ifem_export.elements.material import Material
 from ifem_export.operators.operator_ladder import BALANCE, ENOUGH
-from page.ladder_record import LadderRecord, RungRecord
 
 Data = Mapping[str, Any]
 OWN_CELLS, OWN_LAYERS, OWN_ELEMENT = 42, 4, "bbar"

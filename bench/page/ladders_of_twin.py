@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from bench.page.ladder_record import LadderRecord, RungRecord
 from gelslim_twin.render.shading import Shading
-from page.ladder_record import LadderRecord, RungRecord
 
 Data = Mapping[str, Any]
 NO_PAPER = "has no digital twin."

@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 from typing import Any
 
-from bench_data import write_whole
+from bench.bench_data import write_whole
 
 INK, GRID = "#333a44", {"alpha": 0.25, "which": "major"}
 POINTS = {

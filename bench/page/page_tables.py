@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from bench_data import DOCS
+from bench.bench_data import DOCS
 
 Data = dict[str, Any]
 NUS = (0.3223, 0.45, 0.49)

@@ -1,4 +1,4 @@
-"""One picture of the animation of `bench/press_slip.py`: camera, force field, forces over time."""
+"""A picture of the animation of `bench.force.press_slip`: camera, force field, forces over time."""
 
 from __future__ import annotations
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bench_data import DOCS
-
-from page.page_tables import table
+from bench.bench_data import DOCS
+from bench.page.page_tables import table
 
 Data = Mapping[str, Any]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from page.force_tables import ms
+from bench.page.force_tables import ms
 
 UNITS = {"force_n": "N", "displacement_px": "px", "markers_px": "px", "image_px": "px"}
 Rows = list[dict[str, Any]]

@@ -16,6 +16,8 @@ from scipy.interpolate import (
 )
 from scipy.spatial import Delaunay
 
+from bench.rigs.force_ladder_markers import median_ms
+from bench.rigs.force_rig import GEL, SEED, Rig
 from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
 from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_force.motion.marker_motion import COMPENSATIONS, MarkerView
@@ -23,8 +25,6 @@ from gelslim_force.motion.surface_motion import SurfaceMotion
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.operators.ladder import lumped, refined
 from ifem_export.operators.surface_operator import SurfaceOperator
-from rigs.force_ladder_markers import median_ms
-from rigs.force_rig import GEL, SEED, Rig
 
 Array = NDArray[np.float64]
 Interpolate = Callable[[Array], Array]

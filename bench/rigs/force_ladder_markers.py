@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from bench.rigs.force_rig import SEED, Rig
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
@@ -19,7 +20,6 @@ from gelslim_twin.render.frame_renderer import RenderedFrame
 from gelslim_twin.render.image_sensor import SensorNoise
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.shading import Shading
-from rigs.force_rig import SEED, Rig
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

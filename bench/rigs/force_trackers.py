@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.rigs.force_ladder_markers import blob_detector, nearest_dots
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.render.frame_renderer import RenderedFrame
-from rigs.force_ladder_markers import blob_detector, nearest_dots
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]

@@ -17,6 +17,7 @@ import numpy as np
 from agreement import Outcome, Trial
 from random_contact_scenes import random_contact
 
+from bench.rigs.twin_rig import mechanics_key
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Plan
@@ -28,7 +29,6 @@ from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.scene_task import planned, viewer_of
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 from ifem_export.compliance.columns import SurfaceCompliance
-from rigs.twin_rig import mechanics_key
 
 Made = TypeVar("Made")
 LONGER = 4

@@ -11,11 +11,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bench.rigs.planning_cases import Case, Run, measured, prepared
+from bench.rigs.twin_rig import SCENES, plan_key
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.sensor import stored_sensor
-from rigs.planning_cases import Case, Run, measured, prepared
-from rigs.twin_rig import SCENES, plan_key
 
 LEVELS = {"own": None, "loose": 0.1, "tight": 0.01}
 LOWEST, HIGHEST = 0.005, 0.2

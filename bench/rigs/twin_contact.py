@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.rigs.twin_rig import SCENES, turns_ms
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.planning.question import bundle_figures, plan_scene
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.mesh.pad_mesh import PadMesh
-from rigs.twin_rig import SCENES, turns_ms
 
 Array = NDArray[np.float64]
 Rows = list[dict[str, Any]]

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from bench.rigs.twin_effects import MATCH_PX, MECHANICS, measured
+from bench.rigs.twin_rig import KeptBench, plan_key, turns_ms
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.planning.plan import Plan
-from rigs.twin_effects import MATCH_PX, MECHANICS, measured
-from rigs.twin_rig import KeptBench, plan_key, turns_ms
 
 Array = NDArray[np.float64]
 Rows = list[dict[str, Any]]

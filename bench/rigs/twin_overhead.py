@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from bench.rigs.twin_rig import SCENES, TwinSensor
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.outputs.canvas import encoded
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.planning.question import bundle_figures, plan_scene
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.surface_state import SurfaceState
@@ -32,9 +32,9 @@ from gelslim_twin.simulation.run_folder import LEDGER, PLAN, RunFolder
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import BUNDLE
 from gelslim_twin.simulation.simulate import Ledger, simulate
+from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.markers.interpolation import marker_to_node
-from rigs.twin_rig import SCENES, TwinSensor
 
 SCENE = "shear_sphere"
 """Thirty poses in a linear gel with pictures: quick stages, in which overhead shows most."""

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from bench.bench_data import ROOT
+from bench.rigs.twin_effects import MECHANICS, Bench
 from gelslim.scene_sensor import spec_bundle
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
@@ -21,9 +23,7 @@ from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, store_sensor, stored_sensor
-from rigs.twin_effects import MECHANICS, Bench
 
-ROOT = Path(__file__).parents[2]
 SPEC = ROOT / "designs" / "gelslim2.yaml"
 SCENES = ROOT / "designs" / "scenes"
 QUICK = ("press_sphere", "release")

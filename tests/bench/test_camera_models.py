@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench_data import DOCS
-from camera_models import DESIGNS, Scene, calibrated, designed, errors, flat, known
-from models.thick_lens import DISTORTION, ThickLens
-from models.thin_lens import ThinLens
-from page.ladders_of_camera import KNOWN
 
+from bench.bench_data import DOCS
+from bench.models.thick_lens import DISTORTION, ThickLens
+from bench.models.thin_lens import ThinLens
+from bench.optics.camera_models import DESIGNS, Scene, calibrated, designed, errors, flat, known
+from bench.page.ladders_of_camera import KNOWN
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec
 
@@ -91,7 +91,7 @@ def test_rows_are_measured_again(small: Scene) -> None:
         held = row("mini20", model.label)
         for key, value in errors(small, model).items():
             assert value == pytest.approx(held[key], rel=1e-3, abs=1e-6), (
-                f"{model.label}, {key}: run python bench/camera_models.py"
+                f"{model.label}, {key}: run python -m bench.optics.camera_models"
             )
 
 

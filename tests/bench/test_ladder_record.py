@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
-
-from page.accuracy_figure import drawn
-from page.accuracy_text import beating, table
-from page.ladder_record import LadderRecord, RungRecord
+from bench.page.accuracy_figure import drawn
+from bench.page.accuracy_text import beating, table
+from bench.page.ladder_record import LadderRecord, RungRecord
 
 
 def some_ladder(kind: Any = "ladder", **changes: Any) -> LadderRecord:

@@ -6,21 +6,19 @@ Times are never looked at.
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from bench import accuracy_page
+from bench.optics.light_rays import led_scene
+from bench.page.ladder_record import LadderRecord
+from bench.stiffness import stiffness_cases
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-sys.path.insert(0, str(ROOT / "bench"))
-
-import accuracy_page  # noqa: E402
-import stiffness_cases  # noqa: E402
-from light_rays import led_scene  # noqa: E402
-from page.ladder_record import LadderRecord  # noqa: E402
 
 MACHINE = ("machine", "system", "processor", "cores", "threads", "python", "numpy", "scipy",
            "numba", "seed")  # fmt: skip
@@ -130,9 +128,8 @@ def test_light_is_traced_again() -> None:
 
 
 def test_matching_is_tried_again() -> None:
-    from rigs.force_ladder_markers import nearest_dots, rest_lattice, shot
-    from rigs.force_rig import SEED, small_rig
-
+    from bench.rigs.force_ladder_markers import nearest_dots, rest_lattice, shot
+    from bench.rigs.force_rig import SEED, small_rig
     from gelslim_force.tracking.matching import match
 
     rig = small_rig()

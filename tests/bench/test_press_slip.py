@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,10 +9,9 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "bench"))
 
 pytest.importorskip("matplotlib")
-from page.press_slip_figure import Moment, longest_runs, ratio  # noqa: E402
+from bench.page.press_slip_figure import Moment, longest_runs, ratio  # noqa: E402
 
 FILE = ROOT / "docs" / "images" / "press_slip.webp"
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from bench.learning import real_locations as bench
+
 ROOT = Path(__file__).parents[2]
 FRAMES = Path(os.environ.get("GELSLIM_REAL_FRAMES", ROOT.parent / "shared" / "real_frames"))
-sys.path.insert(0, str(ROOT / "bench"))
-
-import real_locations as bench  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 cq = pytest.importorskip("cadquery")
 
-from models.surface_deviation import deviation_um, lattice  # noqa: E402
-
+from bench.models.surface_deviation import deviation_um, lattice  # noqa: E402
 from gelslim_cad.export.mesh import face_patches  # noqa: E402
 
 

@@ -19,7 +19,7 @@ from typer.main import get_command
 from gelslim.cli.app import app
 
 KNOWN: Any = get_command(app).commands  # type: ignore[attr-defined]
-SCRIPT = re.compile(r"python ((?:bench|tools)/\w+\.py(?: --?[a-z][^`\n#]*)?)")
+SCRIPT = re.compile(r"python ((?:-m bench\.[\w.]+|tools/\w+\.py)(?: --?[a-z][^`\n#]*)?)")
 SCRIPTS = sorted({s.strip() for page in PAGES for s in SCRIPT.findall(text_of(page))})
 MADE = sorted(
     {line for page in PAGES for line in shell_lines(page) if re.match(r"make [a-z]", line)}

@@ -8,14 +8,13 @@ import sys
 import pytest
 from page_text import DOCS, PAGES, ROOT, named, text_of
 
-sys.path.insert(0, str(ROOT / "bench"))
 sys.path.insert(0, str(ROOT / "tools"))
 
-import accuracy_page
 import gallery
-import page_blocks
-from page.accuracy_figure import KEY, digest
-from page.ladder_record import LadderRecord, records_of
+
+from bench import accuracy_page, page_blocks
+from bench.page.accuracy_figure import KEY, digest
+from bench.page.ladder_record import LadderRecord, records_of
 
 
 @pytest.mark.parametrize("name", page_blocks.PAGES)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from models.thin_lens import ThinLens
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+
+from bench.models.thin_lens import ThinLens
 
 CORNERS = (9, 7)
 POSES = 20

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import yaml
 from dimensions.fold_samples import USUAL, changed, shipped
-from models.thin_lens import ThinLens
 from sampled import quick
 from test_lens_as_built import DESIGNS, calibrated, seen_at, seen_by_calibration
 
 import gelslim
+from bench.models.thin_lens import ThinLens
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.dimensions.fold.wishes import EQUAL_PX

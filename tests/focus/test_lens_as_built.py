@@ -8,11 +8,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 from chessboard import measured_lens
-from models.thin_lens import ThinLens
 from numpy.typing import NDArray
 from scipy.optimize import root
 
 import gelslim
+from bench.models.thin_lens import ThinLens
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.spec.reader import read_spec
 from gelslim_force.calibration.built_deviation import BuiltDeviation

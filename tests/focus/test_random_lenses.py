@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from models.thin_lens import ThinLens
 from stability.legal_specs import Sample, sample
 from test_lens_as_built import (
     corners_are_where_the_rule_has_them,
@@ -18,6 +17,7 @@ from test_lens_as_built import (
 )
 
 import gelslim
+from bench.models.thin_lens import ThinLens
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
 

@@ -3,7 +3,7 @@
 The pad has half the pitch of the bundle's and five layers instead of four. Contact with Coulomb's
 friction is the twin's, by Newton's method on the whole gel; `tests/calculix` compares contacts of
 this kind with CalculiX. Solving one takes about 20 s, so that the motion of the surface and the
-forces are stored: `python bench/solved_contacts.py` solves them again.
+forces are stored: `python -m bench.force.solved_contacts` solves them again.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from gelslim_twin.contact.gel_body import GelBody
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.bundle import build_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError

@@ -1,6 +1,6 @@
 """The standard deviations of forces hold over random contacts.
 
-`bench/force_sigma.py` scores 200 of each mode.
+`bench/force/force_sigma.py` scores 200 of each mode.
 """
 
 from __future__ import annotations

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 from light_cases import N_ACRYLIC, N_GEL, finger
-from models.facets import facetted_profile
 from numpy.typing import NDArray
 from shapely import Polygon, constrained_delaunay_triangles
 from shapely.geometry.polygon import orient
 
+from bench.models.facets import facetted_profile
 from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
 from gelslim_optics.guide.tir_certificate import certify_tir
 from gelslim_optics.light.result import estimate

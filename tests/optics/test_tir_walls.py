@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import tir_march
-from models.facets import facetted_profile
 from sampled import quick
 from tir_march import ARRIVED, LEAKED, LOST
 
+from bench.models.facets import facetted_profile
 from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
 from gelslim_optics.guide.shapes import (
     CurvedGuide,

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 from light_cases import COATS, N_ACRYLIC, bend_scene, lone_bend, loop, media, slab
-from models.facets import facetted_profile
 from sampled import quick
 
+from bench.models.facets import facetted_profile
 from gelslim_optics.light.result import LightResult
 from gelslim_optics.light.scene import LightScene, Surface
 from gelslim_optics.light.source import EdgeLaunch

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models.thin_lens import ThinLens
 from numpy.typing import NDArray
 from scipy.optimize import root
 from tolerance_samples import NAMES, drawn, exact, spec
 
+from bench.models.thin_lens import ThinLens
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.tolerance.assembly import assembled, border_points, frame_mm
 from gelslim_cad.tolerance.built import as_dropped_in, built, play_left

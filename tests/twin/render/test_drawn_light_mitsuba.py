@@ -13,8 +13,8 @@ pytest.importorskip(
     "mitsuba",
     reason="Mitsuba 3 is absent: the drawn light was NOT checked against it (extra `mitsuba`)",
 )
-import drawn_light
-from models.mitsuba_finger import renderer
+from bench.models.mitsuba_finger import renderer
+from bench.optics import drawn_light
 
 pytestmark = pytest.mark.slow
 SAMPLES = 1.0 if os.environ.get("DRJIT_LIBLLVM_PATH") else 0.15

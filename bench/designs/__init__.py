@@ -1,0 +1,1 @@
+"""Benches of designs: batches, tessellation of the parts, yields."""

@@ -1,0 +1,263 @@
+"""Do the standard deviations of forces hold? Scores over random contacts, and their curve.
+
+    python -m bench.force.force_sigma              # 200 contacts of each mode
+    python -m bench.force.force_sigma --processes 8
+    python -m bench.force.force_sigma --deep       # the deep contacts only; the rest is kept
+    python -m bench.force.force_sigma --figure     # draw the figure from the data again
+
+Writes docs/data/force_sigma.json and docs/images/force_sigma.png. Contacts and the scores of each
+slice are kept in a folder, so that a run that was stopped goes on where it ended. The contacts are
+those of tests/force/sigma_cases.py; the deep ones, of a neo-Hookean gel, those of
+tests/force/deep_contacts.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from bench.bench_data import DOCS, ROOT, write_data, write_whole
+from bench.rigs.machine import machine
+from gelslim_core.jobs import Engine
+
+Array = NDArray[np.float64]
+Record = Mapping[str, Any]
+SLICE, DEEP_SLICE = 10, 9
+KEPT = Path("out") / "force_sigma"
+COMPONENTS = ("F_x", "F_y", "F_z")
+COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57")
+SIZE_IN, DPI = (11.5, 3.6), 110
+
+
+def main() -> None:
+    """Score the contacts, or draw the figure of stored scores."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--cases", type=int, default=200, help="contacts of each mode")
+    parser.add_argument("--kept", type=Path, default=KEPT, help="folder for contacts and slices")
+    parser.add_argument("--deep", action="store_true", help="score the deep contacts only")
+    parser.add_argument("--processes", type=int, default=1, help="that share the contacts")
+    parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
+    parser.add_argument("--docs", type=Path, default=DOCS, help="folder like docs")
+    options = parser.parse_args()
+    stored = options.docs / "data" / "force_sigma.json"
+    if not options.figure:
+        if options.deep:
+            data = json.loads(stored.read_text("utf-8"))
+        else:
+            data = {**machine(31), "cases": options.cases, "modes": scored(options)}
+        data["deep"] = deep_scored(options.processes)
+        write_data("force_sigma", data, options.docs)
+    record = json.loads(stored.read_text("utf-8"))
+    panels = {**record["modes"], "nothing given, deep": {"auto": record["deep"]["auto"]}}
+    write_whole(options.docs / "images" / "force_sigma.png", drawn(panels))
+    print(table(record))
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Contacts that one process scores in all modes, with the folder for contacts and scores."""
+
+    seeds: range
+    kept: Path
+
+
+@dataclass(frozen=True)
+class DeepSlice:
+    """Deep contacts that one process scores with one law of the gel."""
+
+    law: str
+    seeds: range
+
+
+def scored(options: argparse.Namespace) -> dict[str, Any]:
+    """Scores, median errors and deviations by mode and condition."""
+    _see_tests()
+    from sigma_cases import CONDITIONS
+    from sigma_gate import MODES
+
+    options.kept.mkdir(parents=True, exist_ok=True)
+    slices = [
+        Slice(range(first, min(first + SLICE, options.cases)), options.kept)
+        for first in range(0, options.cases, SLICE)
+    ]
+    for number, _ in Engine(options.processes).run(score_slice, slices):
+        print(slices[number].seeds, flush=True)
+    rows: dict[str, dict[str, list[Record]]] = {
+        mode: {condition: [] for condition in CONDITIONS} for mode in MODES
+    }
+    for some in slices:
+        for mode in MODES:
+            for name, every in json.loads(_path(some, mode).read_text("utf-8")).items():
+                rows[mode][name] += every
+    return {
+        mode: {name: _condition(every) for name, every in some.items()}
+        for mode, some in rows.items()
+    }
+
+
+def score_slice(some: Slice) -> None:
+    """Write the scores of a slice, mode by mode, where they are not kept."""
+    _see_tests()
+    from sigma_gate import MODES, scores
+
+    for mode in MODES:
+        if not _path(some, mode).exists():
+            found = scores(mode, some.seeds, some.kept)
+            plain = {name: [vars(s) for s in every] for name, every in found.items()}
+            write_whole(_path(some, mode), json.dumps(plain).encode("utf-8"))
+
+
+def _path(some: Slice, mode: str) -> Path:
+    return some.kept / f"{mode.split()[0]}-{some.seeds.start}-{some.seeds.stop}.json"
+
+
+def deep_scored(processes: int) -> dict[str, Any]:
+    """Scores and relative errors of the deep contacts by law of the gel; nothing is given."""
+    _see_tests()
+    from deep_contacts import COUNT, SEEN
+    from deep_gate import LAWS, deep_summary
+
+    slices = [
+        DeepSlice(law, range(first, min(first + DEEP_SLICE, COUNT)))
+        for law in LAWS
+        for first in range(0, COUNT, DEEP_SLICE)
+    ]
+    scores = dict(Engine(processes).run(score_deep_slice, slices))
+    found = {}
+    for law in LAWS:
+        own = [scores[k] for k in range(len(slices)) if slices[k].law == law]
+        some = [score for part in own for score in part]
+        parts = {"relative": some, "relative_held_out": some[SEEN:]}
+        errors = {
+            name: {key: _short(value) for key, value in deep_summary(part).items()}
+            for name, part in parts.items()
+        }
+        found[law] = {**_condition(vars(s.score) for s in some), **errors}
+    return found
+
+
+def score_deep_slice(some: DeepSlice) -> tuple[Any, ...]:
+    """The scores of some deep contacts."""
+    _see_tests()
+    from deep_gate import deep_scores
+
+    return deep_scores(some.law, some.seeds)
+
+
+def _see_tests() -> None:
+    """The contacts are those of the tests."""
+    folder = str(ROOT / "tests" / "force")
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+
+
+def _condition(rows: Iterable[Record]) -> dict[str, Any]:
+    every = list(rows)
+    given = [row for row in every if row["error_n"]]
+    return {
+        "refused": len(every) - len(given),
+        "error_mn": [[_short(1000 * value) for value in row["error_n"]] for row in given],
+        "sigma_mn": [[_short(1000 * value) for value in row["sigma_n"]] for row in given],
+    }
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def table(record: Record) -> str:
+    """The scores as a Markdown table, with what they stand for."""
+    lines = [
+        f"{record['cases']} contacts of each mode, the conditions in turn; three numbers are those "
+        "of F_x, F_y and F_z.",
+        "",
+        "| known, condition | contacts | refused | median error, mN | median σ, mN | "
+        "RMS of error/σ | mean of error/σ | within 1.96 σ |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for mode, conditions in record["modes"].items():
+        every = list(conditions.values())
+        lines += [_row(f"{mode}, {name}", [row]) for name, row in conditions.items()]
+        lines.append(_row(f"**{mode}, all**", every))
+    lines += [_row(f"nothing given, deep, gel {law}", [row]) for law, row in record["deep"].items()]
+    return "\n".join(lines)
+
+
+def _row(name: str, conditions: list[Record]) -> str:
+    error, sigma = (
+        np.concatenate([row[key] for row in conditions]) for key in ("error_mn", "sigma_mn")
+    )
+    refused, z = sum(row["refused"] for row in conditions), error / sigma
+    cells = [
+        name,
+        f"{len(z) + refused}",
+        f"{refused}",
+        _three(np.median(np.abs(error), axis=0), ".2g"),
+        _three(np.median(sigma, axis=0), ".2g"),
+        _three(np.sqrt((z**2).mean(axis=0)), ".2f"),
+        _three(z.mean(axis=0), "+.2f"),
+        _three(100 * (np.abs(z) < norm.ppf(0.975)).mean(axis=0), ".0f") + " %",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def _three(values: Iterable[float], form: str) -> str:
+    return ", ".join(_plain(format(value, form)) for value in values)
+
+
+def _plain(text: str) -> str:
+    return f"{float(text):g}" if "e" in text else text
+
+
+def drawn(modes: Record) -> bytes:
+    """Observed against nominal coverage, a panel for each mode, as PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure: Any = Figure(figsize=SIZE_IN, dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(modes), sharey=True)
+    nominal = np.linspace(0.02, 0.995, 80)
+    limits = norm.ppf((1 + nominal) / 2)
+    for axes, (mode, conditions) in zip(panels, modes.items(), strict=True):
+        error, sigma = (
+            np.concatenate([row[key] for row in conditions.values()])
+            for key in ("error_mn", "sigma_mn")
+        )
+        z = np.abs(error / sigma)
+        _expected(axes, nominal, len(z))
+        for k, colour in enumerate(COLOURS):
+            seen = (z[:, k, None] < limits).mean(axis=0)
+            axes.plot(100 * nominal, 100 * seen, color=colour, lw=1.4, label=f"${COMPONENTS[k]}$")
+        axes.set(title=mode, xlabel="nominal coverage, %", xlim=(0, 100), ylim=(0, 100))
+        axes.set_aspect("equal")
+    panels[0].set_ylabel("observed coverage, %")
+    panels[0].legend(loc="upper left", fontsize=8, frameon=False)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _expected(axes: Any, nominal: Array, count: int) -> None:
+    """The diagonal, with twice the deviation of a share of `count` frames."""
+    spread = 2 * np.sqrt(nominal * (1 - nominal) / max(count, 1))
+    axes.fill_between(
+        100 * nominal, 100 * (nominal - spread), 100 * (nominal + spread), color="#dfe4ea", lw=0
+    )
+    axes.plot([0, 100], [0, 100], color="#9aa3ad", lw=0.8)
+
+
+if __name__ == "__main__":
+    main()

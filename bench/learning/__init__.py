@@ -1,0 +1,1 @@
+"""Benches of data sets and of the networks that learn from them."""

@@ -1,0 +1,127 @@
+"""A data set on a Dask cluster of one worker and of two: wall time, and processor time by process.
+
+    python -m bench.learning.data_set_workers    # 80 samples with 31 frames each, three pairs
+    python -m bench.learning.data_set_workers --samples 40 --pairs 1
+
+The scene is designs/scenes/shear_sphere.yaml. The scheduler and the workers are processes of their
+own, as users start them. The machine must have nothing else to do. Workers are new for every run,
+and so is the data set; its sensor with its compliance is that of the run before. Writes nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+
+import psutil
+
+from bench.bench_data import DOCS
+
+SCENE = DOCS.parent / "designs" / "scenes" / "shear_sphere.yaml"
+FRAMES = 31
+START_S = 30
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=80)
+    parser.add_argument("--pairs", type=int, default=3)
+    parser.add_argument("--frames-per-shard", type=int, default=124)
+    asked = parser.parse_args()
+    size = asked.samples, asked.frames_per_shard
+    ratios = []
+    with TemporaryDirectory() as place:
+        made(Path(place), 2, (4, FRAMES))  # the compliance, and compiled kernels
+        for pair in range(asked.pairs):
+            order = (1, 2) if pair % 2 else (2, 1)
+            wall_s = {workers: made(Path(place), workers, size) for workers in order}
+            ratios.append(wall_s[1] / wall_s[2])
+    print(f"{asked.samples * FRAMES} frames: two workers are {median(ratios):.2f} times as fast")
+
+
+def made(place: Path, workers: int, size: tuple[int, int]) -> float:
+    """Make a data set; returns the seconds that it took."""
+    samples, frames_per_shard = size
+    out = place / f"out_{time.monotonic_ns()}"
+    with cluster(place, workers) as (address, processes):
+        command = [
+            *(sys.executable, "-m", "gelslim", "dataset", str(SCENE), "--count", str(samples)),
+            *("--frames", "all", "--frames-per-shard", str(frames_per_shard)),
+            *("--scheduler", address, "-o", str(out)),
+        ]
+        before = [spent_s(process) for process in processes]
+        start = time.perf_counter()
+        child = psutil.Popen(command, stdout=subprocess.DEVNULL)
+        own_s = 0.0
+        while child.poll() is None:
+            own_s = max(own_s, spent_s(child))
+            time.sleep(0.05)
+        wall_s = time.perf_counter() - start
+        if child.returncode:
+            raise SystemExit(f"gelslim dataset ended with {child.returncode}")
+        used = [spent_s(p) - s for p, s in zip(processes, before, strict=True)]
+    print(
+        f"{workers} worker{'s' * (workers > 1)}: {wall_s:.1f} s; processor: command {own_s:.1f} s, "
+        f"workers {' and '.join(f'{s:.1f}' for s in used)} s",
+        flush=True,
+    )
+    return wall_s
+
+
+def spent_s(process: psutil.Process) -> float:
+    """Processor time of a process and of its children that have not ended."""
+    try:
+        every = [process, *process.children(recursive=True)]
+        return sum(sum(one.cpu_times()[:2]) for one in every)
+    except psutil.NoSuchProcess:
+        return 0.0
+
+
+@contextmanager
+def cluster(place: Path, workers: int) -> Iterator[tuple[str, list[psutil.Process]]]:
+    """A scheduler with workers; their address and processes."""
+    log = place / "scheduler.log"
+    with open(log, "w", encoding="utf-8") as stream:
+        dask = [sys.executable, "-m", "dask"]
+        scheduler = psutil.Popen(
+            [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"],
+            stdout=stream,
+            stderr=stream,
+        )
+        address = said(log)
+        command = [*dask, "worker", address, "--nthreads", "1", "--no-dashboard"]
+        alone = ["--no-nanny", "--local-directory", str(place)]
+        processes = [
+            psutil.Popen([*command, *alone], stdout=stream, stderr=stream) for _ in range(workers)
+        ]
+        try:
+            time.sleep(START_S / 6)
+            yield address, processes
+        finally:
+            for process in [*processes, scheduler]:
+                process.terminate()
+            for process in [*processes, scheduler]:
+                process.wait()
+
+
+def said(log: Path) -> str:
+    """The address that the scheduler says in its log."""
+    deadline = time.monotonic() + START_S
+    while time.monotonic() < deadline:
+        found = re.search(r"Scheduler at:\s+(tcp://\S+)", log.read_text(encoding="utf-8"))
+        if found:
+            return found.group(1)
+        time.sleep(0.1)
+    raise SystemExit(f"the scheduler has not started within {START_S} s: {log.read_text()}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Benches of camera and light: models of the lens, rays, refraction, drawn light."""

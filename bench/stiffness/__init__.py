@@ -1,0 +1,1 @@
+"""Benches of the pad's stiffness: mesh, assembly, operators."""

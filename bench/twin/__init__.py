@@ -1,0 +1,1 @@
+"""Benches of the digital twin: contact, drawing, planning, single steps, batches."""
