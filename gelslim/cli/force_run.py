@@ -285,7 +285,7 @@ def answer_json(
         {
             "folder": str(folder),
             "operator": pipeline.operator_name,
-            "gel": {**pipeline.gel_law.record(), "frames": plain(summary.gel)},
+            "gel": pipeline.gel_law.record_of(summary.gel, "frames"),
             "frames": summary.frames,
             "frames_dropped": summary.dropped,
             "frames_with_forces": summary.with_forces,

@@ -1,9 +1,10 @@
-"""Which law of the gel a pipeline uses, where, and why not the one that was asked for."""
+"""Which law of the gel gave forces or presses, where, and why not the one that was asked for."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,13 @@ LINEAR, STRAINED = "linear", "neo_hookean"
 _CROWNED = "its surface is crowned"
 _CUT = "the mesh has cut cells at its edge"
 _NAMES = {LINEAR: "linear", STRAINED: "neo-Hookean"}
+Counted = Literal["frames", "presses"]
+"""What a law was used for: frames of a run, or presses of a calibration."""
 
 
 @dataclass(frozen=True)
 class GelLaw:
-    """The law of the gel of one pipeline.
+    """The law of the gel of one pipeline, or of a closed solution that a calibration fits.
 
     Attributes:
         asked: `linear`, `neo_hookean` or `auto`, as in `PipelineSettings`.
@@ -45,6 +48,11 @@ class GelLaw:
             why = _CUT if bundle.mesh.surface_shift is None else _CROWNED
         return cls(asked, law, why, deep_mm(bundle), depth_seen)
 
+    @classmethod
+    def of_layer(cls, thickness_mm: float) -> GelLaw:
+        """The law of `presses.ball_on_layer` for a thickness in mm: linear at every depth."""
+        return cls(LINEAR, LINEAR, "", DEEP_SHARE * thickness_mm, True)
+
     def at(self, displacement_mm: Array) -> dict[str, Any]:
         """Law of one frame, and whether its contact is deep, from the motion (c, 3) of the nodes.
 
@@ -63,17 +71,27 @@ class GelLaw:
         """What a manifest keeps: the law that was asked for, the one in use, and why another."""
         return {"asked": self.asked, "law": self.law, "fallback": self.fallback or None}
 
+    def record_of(self, use: GelUse, counted: Counted) -> dict[str, Any]:
+        """The same, with how many frames or presses each law was used for."""
+        return {**self.record(), counted: asdict(use)}
+
 
 @dataclass
 class GelUse:
-    """Frames with forces by the law of the gel that gave them."""
+    """Frames with forces, or presses, by the law of the gel that gave them."""
 
     linear: int = 0
     neo_hookean: int = 0
     deep_linear: int = 0
-    """Frames with a deep contact whose forces are those of the linear law."""
+    """Those of the linear law whose contact is deep."""
 
-    def add(self, frame: dict[str, Any]) -> None:
+    @classmethod
+    def of_depths(cls, gel: GelLaw, depths_mm: Iterable[float]) -> GelUse:
+        """Contacts of known depths in mm, all by the linear law."""
+        deep = [depth >= gel.deep_mm for depth in depths_mm]
+        return cls(linear=len(deep), deep_linear=sum(deep))
+
+    def add(self, frame: Mapping[str, Any]) -> None:
         """Add a frame, as `GelLaw.at` describes it."""
         if frame["law"] == STRAINED:
             self.neo_hookean += 1
@@ -81,11 +99,11 @@ class GelUse:
             self.linear += 1
             self.deep_linear += frame["deep"] is True
 
-    def sentences(self, gel: GelLaw) -> tuple[str, ...]:
-        """Which law gave the forces of the frames, why, and what it leaves out."""
+    def sentences(self, gel: GelLaw, counted: Counted = "frames") -> tuple[str, ...]:
+        """Which law was used for how many frames or presses, why, and what it leaves out."""
         deep = f"{gel.deep_mm:.2g} mm, {DEEP_SHARE:.0%} of the thickness"
         used = [
-            f"{_NAMES[law]} in {_frames(count)}"
+            f"{_NAMES[law]} in {_number(count, counted)}"
             for law, count in ((LINEAR, self.linear), (STRAINED, self.neo_hookean))
             if count
         ]
@@ -103,14 +121,18 @@ class GelUse:
         elif gel.law == "auto" and used:
             found.append(f"--gel auto takes the neo-Hookean law from a depth of {deep}.")
         if self.deep_linear:
-            remedy = "" if gel.fallback else "; give --gel auto"
+            more = ""
+            if counted == "frames":
+                remedy = "" if gel.fallback else "; give --gel auto"
+                more = f"; the stated deviation holds this{remedy}"
             found.append(
-                f"In {_frames(self.deep_linear)} the contact is deeper than {deep}, where the "
-                f"linear law gives too little normal force, for a ball 4 % there and 15 % at 38 % "
-                f"of the thickness; the stated deviation holds this{remedy}."
+                f"In {_number(self.deep_linear, counted)} the contact is deeper than {deep}, where "
+                f"the linear law gives too little normal force, for a ball 4 % there and 15 % at "
+                f"38 % of the thickness{more}."
             )
         return tuple(found)
 
 
-def _frames(count: int) -> str:
-    return "1 frame" if count == 1 else f"{count} frames"
+def _number(count: int, counted: Counted) -> str:
+    one = {"frames": "frame", "presses": "press"}[counted]
+    return f"1 {one}" if count == 1 else f"{count} {counted}"

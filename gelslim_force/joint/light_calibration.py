@@ -51,6 +51,7 @@ class LightCalibration:
         presses: What was found of each press, as plain data.
         diagnosis: What was found, in sentences.
         warnings: What should be looked at before the calibration is trusted.
+        gel: Law of the gel that the slopes under the ball are of, as `GelLaw.record_of` gives it.
 
     Raises:
         ValueError: Arrays contradict one another, or a value is impossible.
@@ -69,6 +70,7 @@ class LightCalibration:
     presses: tuple[Mapping[str, Any], ...] = ()
     diagnosis: tuple[str, ...] = field(default=())
     warnings: tuple[str, ...] = field(default=())
+    gel: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         count = len(self.channels)
@@ -126,6 +128,7 @@ def light_calibration_record(found: LightCalibration) -> dict[str, Any]:
         "gain_sigma": found.gain_sigma,
         "light_error": found.light_error,
         "ball_mm": found.ball_mm,
+        "gel": dict(found.gel),
         "presses": [dict(press) for press in found.presses],
         "diagnosis": list(found.diagnosis),
         "warnings": list(found.warnings),
@@ -182,4 +185,5 @@ def _calibration_of(record: Mapping[str, Any]) -> LightCalibration:
         tuple(dict(press) for press in record["presses"]),
         tuple(str(line) for line in record["diagnosis"]),
         tuple(str(line) for line in record["warnings"]),
+        dict(record.get("gel", {})),
     )  # fmt: skip

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.light_baseline import ROBUST
+from gelslim_force.forces.gel_law import GelLaw, GelUse
 from gelslim_force.presses.ball_check import require_ball
 from gelslim_force.presses.gel_calibration import GelCalibration, designed_thickness_mm
 from gelslim_force.presses.gel_fit import FREE_RATIO_SIGMA, FittedGel, FittedPress, fit_gel
@@ -133,16 +134,20 @@ def _calibration(
         "poissons_ratio": gel.poissons_ratio,
         **({"skin_n_per_mm": skin} if fitted or skin else {}),
     }
+    built_mm = thickness * float(np.exp(found.log_thickness))
+    law = GelLaw.of_layer(built_mm)
+    use = GelUse.of_depths(law, (press.depth_mm for press in found.presses))
     made = GelCalibration(
         bundle.geometry_hash,
         float(np.exp(found.log_young)),
-        thickness * float(np.exp(found.log_thickness)),
+        built_mm,
         found.poissons_ratio,
         _covariance(view, found, trends.modulus_sigma, ratio_known, fitted),
         design,
         ball_mm,
         tuple(_press_record(press) for press in found.presses),
         skin_n_per_mm=skin_figure(view, found).n_per_mm if fitted else None,
+        gel=law.record_of(use, "presses"),
     )
     sigma = _residual_sigma(found.presses)
     lines = (
@@ -150,6 +155,7 @@ def _calibration(
         *_skin_lines(made, view, free),
         *trends.lines(),
         *_returned(moved_px),
+        *use.sentences(law, "presses"),
     )
     return GelCalibration(
         **{name: getattr(made, name) for name in made.__dataclass_fields__

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.forces.gel_law import GelLaw, GelUse
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.light_view import LightView
@@ -107,6 +108,8 @@ def calibrate_light(
     half = np.ptp(points, axis=0) / 2
     light = fit_light(lights, law, middle, half)
     _require_explained(light, list(pictures))
+    layer = GelLaw.of_layer(view.thickness_mm * float(np.exp(fitted.log_thickness)))
+    use = GelUse.of_depths(layer, (press.depth_mm for press in fitted.presses))
     made = LightCalibration(
         bundle.geometry_hash,
         tuple(channels),
@@ -119,9 +122,12 @@ def calibrate_light(
         float(np.sqrt(np.mean(light.light_error**2))),
         ball_mm,
         tuple(_press_records(fitted, light, channels)),
+        gel=layer.record_of(use, "presses"),
     )
     return replace(
-        made, diagnosis=_diagnosis(made, light, fit_ball), warnings=_warnings(made, light, fitted)
+        made,
+        diagnosis=(*_diagnosis(made, light, fit_ball), *use.sentences(layer, "presses")),
+        warnings=_warnings(made, light, fitted),
     )
 
 

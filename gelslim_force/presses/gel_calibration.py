@@ -50,6 +50,7 @@ class GelCalibration:
         warnings: What should be looked at before the calibration is trusted.
         skin_n_per_mm: Membrane stiffness of coat and fabric together, at least 0; None where it was
             not fitted and is that of the design.
+        gel: Law of the gel that explains the presses, as `GelLaw.record_of` gives it.
 
     Raises:
         ValueError: A value is impossible, or the covariance is none.
@@ -66,6 +67,7 @@ class GelCalibration:
     diagnosis: tuple[str, ...] = field(default=())
     warnings: tuple[str, ...] = field(default=())
     skin_n_per_mm: float | None = None
+    gel: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         covariance = np.array(self.covariance, dtype=float)
@@ -191,6 +193,7 @@ def gel_calibration_record(found: GelCalibration) -> dict[str, Any]:
         "covariance": found.covariance.tolist(),
         "design": dict(found.design),
         "ball_mm": found.ball_mm,
+        "gel": dict(found.gel),
         "presses": [dict(press) for press in found.presses],
         "diagnosis": list(found.diagnosis),
         "warnings": list(found.warnings),
@@ -249,4 +252,5 @@ def _calibration_of(record: Mapping[str, Any]) -> GelCalibration:
         tuple(str(line) for line in record["diagnosis"]),
         tuple(str(line) for line in record["warnings"]),
         None if skin is None else float(skin),
+        dict(record.get("gel", {})),
     )

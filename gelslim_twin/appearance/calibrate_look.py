@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.calibration.design import bundle_grid, marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.forces.gel_law import GelLaw, GelUse
 from gelslim_force.frames.upright import upright
 from gelslim_force.sensor import open_sensor
 from gelslim_optics.camera.record import is_mono
@@ -47,6 +48,7 @@ class SeenPress:
         displacement_mm: (c, 3) of the surface nodes; None where no contact is seen.
         markers_px: (m, 2) dots in the picture, those that were followed.
         moments_px2: (m, 3) their second moments at rest.
+        gel: Law of the gel that the motion is of, as `GelLaw.at` gives it; None without a contact.
     """
 
     name: str
@@ -54,6 +56,7 @@ class SeenPress:
     displacement_mm: Array | None
     markers_px: Array
     moments_px2: Array
+    gel: Mapping[str, Any] | None = None
 
     def covered(self) -> Mask:
         """(h, w) pixels of its dots."""
@@ -112,10 +115,10 @@ def calibrate_look(
     if light_calibration is not None:
         light_calibration.require_bundle(bundle)
         gain = _shading_gain(light_calibration, gamma, rest.planes.shape[2])
-    seen = seen_presses(bundle, calibration, picture, presses or {}, light_calibration)
+    law, seen = seen_presses(bundle, calibration, picture, presses or {}, light_calibration)
     others = [(press.picture, press.covered()) for press in seen]
     fitted = fit_look(rest, gamma=gamma, shading_gain=gain, others=others)
-    return judged(fitted, rest, seen, bundle)
+    return judged(fitted, rest, seen, bundle, law)
 
 
 def rest_picture(
@@ -170,10 +173,13 @@ def seen_presses(
     picture: Picture,
     presses: Mapping[str, Picture],
     light_calibration: LightCalibration | None,
-) -> list[SeenPress]:
-    """What the force pipeline sees in each press. Raises LookError for lost markers."""
+) -> tuple[GelLaw | None, list[SeenPress]]:
+    """The gel's law, and what the force pipeline sees in each press.
+
+    Raises LookError for lost markers.
+    """
     if not presses:
-        return []
+        return None, []
     pipeline = open_sensor(
         bundle,
         reference=picture,
@@ -196,13 +202,18 @@ def seen_presses(
                 None if motion is None else np.nan_to_num(np.asarray(motion)),
                 np.asarray(result.tracks.positions_px)[tracked],
                 calibration.dots.moments_px2[followed][tracked],
+                None if motion is None else result.extra["gel"],
             )
         )
-    return found
+    return pipeline.gel_law, found
 
 
 def judged(
-    fitted: FittedLook, rest: RestPicture, presses: Sequence[SeenPress], bundle: Bundle
+    fitted: FittedLook,
+    rest: RestPicture,
+    presses: Sequence[SeenPress],
+    bundle: Bundle,
+    law: GelLaw | None,
 ) -> LookCalibration:
     """Draw the pictures again, compare them with the real ones, and say what was found."""
     nodes = np.asarray(bundle.mesh.surface_mm)
@@ -219,10 +230,18 @@ def judged(
         "rest": compare_rest(fitted, rest, drawn_rest, with_noise),
         "presses": compared,
     }
+    told: tuple[str, ...] = ()
+    if law is not None:
+        use = GelUse()
+        for press in presses:
+            if press.gel is not None:
+                use.add(press.gel)
+        found["gel"] = law.record_of(use, "presses")
+        told = use.sentences(law, "presses")
     look = replace(
         fitted.look,
         judged=found,
-        diagnosis=_diagnosis(fitted, found),
+        diagnosis=(*_diagnosis(fitted, found), *told),
         warnings=_warnings(fitted, found, len(presses)),
     )
     return LookCalibration(look, (rest.picture, with_noise), pairs)

@@ -79,12 +79,18 @@ def test_a_built_gel_is_found_and_used(sensor: Path, tmp_path: Path, capsys) -> 
     said = " ".join(capsys.readouterr().out.split())
     assert "Young's modulus" in said
     assert "p3.png" in said
+    assert "Law of the gel: linear in 4 presses." in said
     assert "<svg" in page.read_text(encoding="utf-8")
     record = json.loads(out.read_text(encoding="utf-8"))
     assert record["youngs_modulus_mpa"] == pytest.approx(0.8 * YOUNG_MPA, rel=0.05)
     assert record["thickness_mm"] == pytest.approx(2.1, rel=0.03)
     assert run(sensor, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["reference"] == "a_rest.png"
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["reference"] == "a_rest.png"
+    deep = sum(p["depth_mm"] >= 0.1 * answer["thickness_mm"] for p in answer["presses"])
+    assert answer["gel"] == record["gel"]
+    assert answer["gel"]["law"] == "linear"
+    assert answer["gel"]["presses"] == {"linear": 4, "neo_hookean": 0, "deep_linear": deep}
     assert run(sensor, "--fit-skin", "--json") == 0
     worn = json.loads(capsys.readouterr().out)
     assert worn["skin_n_per_mm"] < 0.01

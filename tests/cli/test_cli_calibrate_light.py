@@ -62,8 +62,11 @@ def test_a_built_light_is_found_and_used(sensor: Path, tmp_path: Path, capsys) -
     said = " ".join(capsys.readouterr().out.split())
     assert "Light in red" in said
     assert "p5.png" in said
+    assert "Law of the gel: linear in 6 presses." in said
     assert "<svg" in page.read_text(encoding="utf-8")
     record = json.loads(out.read_text(encoding="utf-8"))
+    assert record["gel"]["law"] == "linear"
+    assert record["gel"]["presses"]["linear"] == len(record["presses"]) == 6
     gains = np.array(record["gain"])[:, 0] / record["gamma"]
     assert gains == pytest.approx([1.15, 0.85], rel=0.05)
     assert run(sensor, ball="12") == 2

@@ -72,6 +72,28 @@ def test_sentences_tell_what_was_used_and_only_that() -> None:
     assert GelUse(5).sentences(unseen) != GelUse(5).sentences(auto)
 
 
+def test_presses_are_all_by_the_linear_law_of_a_layer() -> None:
+    layer = GelLaw.of_layer(2.0)
+    assert layer.deep_mm == pytest.approx(TENTH_MM)
+    depths = np.array([0.05, 0.15, 0.25, 0.6])
+    use = GelUse.of_depths(layer, depths)
+    counts = {"linear": 4, "neo_hookean": 0, "deep_linear": 2}
+    assert layer.record_of(use, "presses") == {
+        "asked": "linear", "law": "linear", "fallback": None, "presses": counts,
+    }  # fmt: skip
+    one, deep = use.sentences(layer, "presses")
+    assert "linear in 4 presses" in one
+    assert "2 presses" in deep
+    assert "deviation" not in deep
+    assert "--gel" not in deep
+    (alone,) = GelUse.of_depths(layer, depths[:1]).sentences(layer, "presses")
+    assert "linear in 1 press." in alone
+    by_frame = GelUse()
+    for depth in depths:
+        by_frame.add(layer.at(motion(depth)))
+    assert by_frame == use
+
+
 def test_a_run_counts_the_frames_of_each_law(tmp_path: Path) -> None:
     """The depth is given, so that the same picture is a shallow and a deep contact."""
     picture = frame(0.0).image

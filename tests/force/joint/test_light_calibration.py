@@ -44,6 +44,7 @@ def built(**other: Any) -> LightCalibration:
         "presses": ({"picture": "a.png"},),
         "diagnosis": ("One line.",),
         "warnings": ("look here",),
+        "gel": {"law": "linear", "presses": {"linear": 1}},
     }
     return LightCalibration(**{**values, **other})
 
@@ -63,6 +64,7 @@ def test_a_file_keeps_everything(tmp_path: Path) -> None:
     write_light_calibration(built(), tmp_path / "light.json")
     again = read_light_calibration(tmp_path / "light.json")
     assert light_calibration_record(again) == light_calibration_record(built())
+    assert again.gel == built().gel
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,7 @@ def built(bundle: Bundle, *, thickness: float = 1.1, **other: Any) -> GelCalibra
         "presses": ({"picture": "a.png", "load_n": 0.5},),
         "diagnosis": ("One line.",),
         "warnings": ("look here",),
+        "gel": {"law": "linear", "presses": {"linear": 1}},
     }
     return GelCalibration(**{**values, **other})
 
@@ -62,6 +63,7 @@ def test_a_file_keeps_everything(tmp_path: Path) -> None:
     write_gel_calibration(gel, tmp_path / "gel.json")
     again = read_gel_calibration(tmp_path / "gel.json")
     assert gel_calibration_record(again) == gel_calibration_record(gel)
+    assert again.gel == gel.gel
     assert again.standard_deviation == pytest.approx([0.2 * 0.02, 2.2 * 0.01, 0.005])
 
 

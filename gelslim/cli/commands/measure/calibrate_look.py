@@ -90,5 +90,6 @@ def calibrate_look(
         lambda: tell(look.diagnosis, look.warnings),
         page=lambda: look_report_html(found),
         as_json=as_json,
+        more={"gel": look.judged.get("gel")},
     )
     return 0
