@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -194,3 +195,9 @@ def test_no_module_is_longer_than_350_lines() -> None:
     written = {name for name, text in texts.items() if "do not edit by hand" in text[:200]}
     assert written == {"gelslim_cad.checks.rule_ids", "gelslim_cad.geometry.names"}
     assert {name: n for name, n in lengths.items() if n > 350 and name not in written} == {}
+
+
+def test_no_folder_holds_more_than_25_modules() -> None:
+    folders = Counter(p.parent for p in (*SOURCES, *(ROOT / "bench").rglob("*.py")))
+    crowded = {path.relative_to(ROOT).as_posix() for path, n in folders.items() if n > 25}
+    assert crowded == {"gelslim_force/joint"}
