@@ -188,14 +188,16 @@ def worker_pool(workers: int, method: Literal["fork", "spawn"]) -> Iterator[Proc
 def _shared_objects(method: str) -> Iterator[None]:
     """Keep the garbage collector off the objects that forked workers share with this process.
 
-    It would write to each of them, so that every worker gets a copy of their memory.
+    It would write to each of them, so that every worker gets a copy of their memory. A program that
+    has frozen its objects keeps them so.
     """
-    if method == "fork":
+    freezes = method == "fork" and gc.get_freeze_count() == 0
+    if freezes:
         gc.freeze()
     try:
         yield
     finally:
-        if method == "fork":
+        if freezes:
             gc.unfreeze()
 
 

@@ -79,10 +79,21 @@ def test_a_script_that_its_workers_would_run_again_is_refused(
 def test_objects_shared_with_forks_are_left_to_them_by_the_collector() -> None:
     """Frozen objects are not looked through; afterwards all are collected as before."""
     gc.unfreeze()
-    assert gc.get_freeze_count() == 0
-    with worker_pool(1, "fork") as pool:
-        assert gc.get_freeze_count() > 10_000
-        assert pool.submit(gc.get_freeze_count).result() > 10_000
-    assert gc.get_freeze_count() == 0
-    with worker_pool(1, "spawn"):
+    try:
         assert gc.get_freeze_count() == 0
+        with worker_pool(1, "fork") as pool:
+            assert gc.get_freeze_count() > 10_000
+            assert pool.submit(gc.get_freeze_count).result() > 10_000
+        assert gc.get_freeze_count() == 0
+        with worker_pool(1, "spawn"):
+            assert gc.get_freeze_count() == 0
+    finally:
+        gc.freeze()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="forks")
+def test_what_a_program_has_frozen_stays_frozen() -> None:
+    gc.freeze()
+    with worker_pool(1, "fork") as pool:
+        assert pool.submit(gc.get_freeze_count).result() > 10_000
+    assert gc.get_freeze_count() > 10_000
