@@ -17,7 +17,6 @@ PACKAGES = (
     "gelslim", "gelslim_cad", "gelslim_core", "gelslim_force", "gelslim_optics", "gelslim_twin",
     "ifem_export",
 )  # fmt: skip
-SOURCES = sorted(p for name in PACKAGES for p in (ROOT / name).rglob("*.py"))
 
 
 @pytest.mark.parametrize("name", ["con", "NUL", "aux.v2", "Com1", "lpt9.yaml", "finger."])
@@ -36,9 +35,8 @@ def test_names_like_them_pass(name: str) -> None:
         require_folder_name("name", f"{name}.")
 
 
-def calls(path: Path) -> list[ast.Call]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+def sources(package: str) -> list[Path]:
+    return sorted((ROOT / package).rglob("*.py"))
 
 
 def called(call: ast.Call) -> str:
@@ -48,40 +46,72 @@ def called(call: ast.Call) -> str:
     return function.id if isinstance(function, ast.Name) else ""
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.relative_to(ROOT).as_posix())
-def test_text_is_read_and_written_with_an_encoding_and_its_own_newlines(path: Path) -> None:
+def is_portable(call: ast.Call) -> bool:
+    """Whether a call that opens a text says its encoding, and one that writes it its newlines."""
+    given = {k.arg for k in call.keywords}
+    name = called(call)
+    if name in ("read_text", "write_text") and isinstance(call.func, ast.Attribute):
+        # A resource of a package opens without newlines to keep.
+        positional = len(call.args) > (0 if name == "read_text" else 1)
+        encoded = "encoding" in given or positional
+        return encoded and (name == "read_text" or "newline" in given)
+    if isinstance(call.func, ast.Name) and name == "open":
+        mode = next((k.value for k in call.keywords if k.arg == "mode"), None)
+        mode = call.args[1] if len(call.args) > 1 else mode
+        text = mode.value if isinstance(mode, ast.Constant) else "r"
+        if "b" not in str(text):
+            writes = set(str(text)) & set("wax+")
+            to_null = "devnull" in ast.unparse(call)
+            return "encoding" in given and (not writes or to_null or "newline" in given)
+    return True
+
+
+def needs_posix(node: ast.AST) -> bool:
+    """Whether a node names what only POSIX systems have."""
+    if isinstance(node, ast.Call):
+        return ast.unparse(node.func) in ("os.fork", "os.getuid", "os.sched_getaffinity")
+    posix = {"fcntl", "resource", "pwd", "grp", "termios"}
+    return isinstance(node, ast.Import) and bool(posix & {a.name for a in node.names})
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_text_is_read_and_written_with_an_encoding_and_its_own_newlines(package: str) -> None:
     """The defaults are those of the machine: cp1252 and CRLF on Windows."""
-    for call in calls(path):
-        given = {k.arg for k in call.keywords}
-        name = called(call)
-        where = f"{path.name}:{call.lineno}"
-        if name in ("read_text", "write_text") and isinstance(call.func, ast.Attribute):
-            # A resource of a package opens without newlines to keep.
-            positional = len(call.args) > (0 if name == "read_text" else 1)
-            assert "encoding" in given or positional, where
-            if name == "write_text":
-                assert "newline" in given, where
-        if isinstance(call.func, ast.Name) and name == "open":
-            mode = next((k.value for k in call.keywords if k.arg == "mode"), None)
-            mode = call.args[1] if len(call.args) > 1 else mode
-            text = mode.value if isinstance(mode, ast.Constant) else "r"
-            if "b" not in str(text):
-                assert "encoding" in given, where
-                writes = set(str(text)) & set("wax+")
-                to_null = "devnull" in ast.unparse(call)
-                assert not writes or to_null or "newline" in given, where
+    found = [
+        f"{path.name}:{node.lineno}"
+        for path in sources(package)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and not is_portable(node)
+    ]
+    assert found == []
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.relative_to(ROOT).as_posix())
-def test_nothing_is_assumed_that_only_posix_has(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    asked = re.search(r"sys\.platform|hasattr\(os|getattr\(os|suppress\(|_forks\(", text)
-    for call in calls(path):
-        if ast.unparse(call.func) in ("os.fork", "os.getuid", "os.sched_getaffinity"):
-            assert asked, f"{path.name}:{call.lineno}"
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            posix = {"fcntl", "resource", "pwd", "grp", "termios"} & {a.name for a in node.names}
-            assert not posix or asked, f"{path.name}:{node.lineno}"
-    # Places of one system only; an address of a web page is none.
-    assert not re.search(r"""["'](/tmp|/var/|/usr/|[A-Z]:\\)""", text), path.name
+@pytest.mark.parametrize("package", PACKAGES)
+def test_nothing_is_assumed_that_only_posix_has(package: str) -> None:
+    found = []
+    for path in sources(package):
+        text = path.read_text(encoding="utf-8")
+        asked = re.search(r"sys\.platform|hasattr\(os|getattr\(os|suppress\(|_forks\(", text)
+        if not asked:
+            nodes = ast.walk(ast.parse(text))
+            found += [f"{path.name}:{node.lineno}" for node in nodes if needs_posix(node)]  # type: ignore[attr-defined]
+        # Places of one system only; an address of a web page is none.
+        if re.search(r"""["'](/tmp|/var/|/usr/|[A-Z]:\\)""", text):
+            found.append(path.name)
+    assert found == []
+
+
+def test_what_is_not_portable_is_seen() -> None:
+    calls = (
+        "p.read_text()", "p.write_text(t)", 'p.write_text(t, encoding="utf-8")', "open(p)",
+        'open(p, "w", encoding="utf-8")', 'open(p, mode="a", encoding="utf-8")',
+    )  # fmt: skip
+    assert not any(is_portable(ast.parse(c, mode="eval").body) for c in calls)  # type: ignore[arg-type]
+    fine = (
+        'p.read_text("utf-8")', 'p.write_text(t, encoding="utf-8", newline="")', 'open(p, "rb")',
+        'open(p, "w", encoding="utf-8", newline="")', 'open(os.devnull, "w", encoding="utf-8")',
+    )  # fmt: skip
+    assert all(is_portable(ast.parse(c, mode="eval").body) for c in fine)  # type: ignore[arg-type]
+    assert needs_posix(ast.parse("import fcntl").body[0])
+    assert needs_posix(ast.parse("os.fork()", mode="eval").body)
+    assert not needs_posix(ast.parse("import json").body[0])

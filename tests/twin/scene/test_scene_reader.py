@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -115,13 +117,26 @@ def test_every_effect_has_its_field_and_its_parameters():
         assert type(Effects().parameters()[effect.name]) is effect.parameters
 
 
+@cache
+def schema() -> Any:
+    """The validator of scenes; the schema itself is checked once."""
+    made = json.loads(scene_schema_text())
+    kind = jsonschema.validators.validator_for(made)
+    kind.check_schema(made)
+    return kind(made)
+
+
+def fits_the_schema(scene: Any) -> None:
+    schema().validate(scene)
+
+
 @pytest.mark.parametrize("path", GALLERY, ids=lambda p: p.stem)
 def test_gallery_scenes_read_and_fit_the_schema(path):
     loaded = read_scene(path)
     assert loaded.scene.name == path.stem
     assert loaded.sensor_path.resolve().is_file()
     assert path.read_text().startswith("#")
-    jsonschema.validate(YAML(typ="safe").load(path.read_text()), json.loads(scene_schema_text()))
+    fits_the_schema(YAML(typ="safe").load(path.read_text()))
 
 
 def test_the_gallery_is_large_enough_and_shows_every_kind():
@@ -146,7 +161,7 @@ def test_random_scenes_read_and_fit_the_schema(tmp_path, seed):
     loaded = load(tmp_path, text)
     times = [p.time_s for p in loaded.poses]
     assert (np.diff(times) > 0).all()
-    jsonschema.validate(json.loads(text), json.loads(scene_schema_text()))
+    fits_the_schema(json.loads(text))
 
 
 @pytest.mark.parametrize("seed", range(60))
