@@ -22,21 +22,20 @@ from scipy import sparse
 from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
-from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces
+from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces, SoughtForces
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows, rms_length
-from gelslim_force.joint.model_errors import at_edge, by_heights, by_region, edge_nodes
+from gelslim_force.joint.model_errors import edge_nodes, wrench_spread
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
-from gelslim_force.joint.normal_equations import Linearised, NormalEquations
+from gelslim_force.joint.normal_equations import TOLERANCE, Linearised, NormalEquations
 from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.refinement import refined
 from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes, rise_of
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
-from gelslim_force.joint.variance_components import scaled_covariance
 from gelslim_force.motion.marker_motion import MarkerRays, MarkerView
 from gelslim_optics.light.light_law import LightLaw
 from ifem_export.operators.adjoint_fields import rigid_motions
@@ -46,7 +45,10 @@ Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
 _MARKER_LIMIT = 3.0
 """Standard deviations beyond which a marker counts linearly."""
-_LEAST_NODES = 3
+_LEAST_NODES, _CLOSE = 3, 1
+"""The latter: steps about a contact within which light depends on heights at half the pitch."""
+_ROUGH_TOLERANCE = 1e-3
+"""Of forces on the nodes that those at half the pitch follow."""
 _SETTLED = 0.01
 """Change of the force, relative to it, after which another linearisation changes little."""
 _HELD_SLOPE = 0.07
@@ -142,8 +144,26 @@ class JointEstimator:
             if is_new_contact(region, last.seen, self.lattice):
                 begun = self._rounds(frame, region, begun[1], self.settings.rounds)
         nodes = region & self.lattice.widened(begun[0], 1)
-        nodes, state = self._rounds(frame, nodes, begun[1], self.settings.following_rounds)
-        return self._found(frame, region, nodes, refined(self, frame, np.flatnonzero(nodes), state))
+        nodes, state = self._last_rounds(frame, nodes, begun[1])
+        return self._found(frame, region, nodes, state)
+
+    def _last_rounds(self, frame: FrameData, nodes: Mask, state: FitState) -> tuple[Mask, FitState]:
+        """`following_rounds`; the last one is at half the pitch where that is asked for."""
+        rounds = self.settings.following_rounds
+        if self.pressure is None or frame.seen is None:
+            return self._rounds(frame, nodes, state, rounds)
+        for _ in range(rounds[0]):
+            state = self._round(frame, np.flatnonzero(nodes), state)
+        nodes = self._pressing(nodes, state)
+        if self.deepness(state) > 0:
+            nodes, state = self._rounds(frame, nodes, state, rounds[1:])
+        return nodes, refined(self, frame, np.flatnonzero(nodes), state)
+
+    def _pressing(self, nodes: Mask, state: FitState) -> Mask:
+        """Those of the nodes (c,) that press in an estimate, and what they enclose."""
+        pressure = -state.force_n[:, 2] / self.area_mm2
+        least = settings_at(self.settings, self.deepness(state)).least_pressure
+        return pressing_nodes(nodes, pressure, self.neighbours, least)
 
     def shown(self, image: NDArray[np.uint8], markers_px: Array) -> Mask:
         """(c,) nodes whose slope the light of a frame shows, with arguments as in `estimate`.
@@ -159,9 +179,7 @@ class JointEstimator:
         for number, count in enumerate(rounds):
             if number > 0:
                 wider = state.force_n
-                pressure = -state.force_n[:, 2] / self.area_mm2
-                least = settings_at(self.settings, self.deepness(state)).least_pressure
-                nodes = pressing_nodes(nodes, pressure, self.neighbours, least)
+                nodes = self._pressing(nodes, state)
                 held = self._held(state, np.flatnonzero(nodes))
                 if held is not None:
                     state, count = held, count - 1
@@ -193,11 +211,11 @@ class JointEstimator:
         return state
 
     def deepness(self, state: FitState) -> float:
-        """How deep the contact of an estimate is, from 0 to 1."""
+        """From 0 to 1, of the contact of an estimate."""
         return deepness(state.near_mm, self.deep_mm)
 
     @cached_property
-    def _rigid(self) -> Array:
+    def rigid(self) -> Array:
         """(6, c, 3) whose products with forces are force and torque about the origin."""
         return np.asarray(rigid_motions(self.points_mm))
 
@@ -249,15 +267,19 @@ class JointEstimator:
             chosen.normal_stress * young,
             chosen.tangential_stress * young,
         )
-        force, found = np.zeros_like(self.points_mm), equations.solved(data.start, chosen.friction)
+        tolerance = TOLERANCE if self.pressure is None else _ROUGH_TOLERANCE
+        found = equations.solved(data.start, chosen.friction, tolerance)
+        force = np.zeros_like(self.points_mm)
         force[nodes] = found.reshape(-1, 3)
         motion = GelMotion(self.responses, nodes, force[nodes], data.offset_mm)
+        sums = np.reshape(self.rigid[:, nodes], (6, -1))
+        sought = SoughtForces(sums, np.repeat(force[nodes, 2] < 0, 3))
         light, higher = data.light, data.heights_after(found)
         if light is None or higher is None:
-            return FitState(force, motion, data.gain, equations, data.markers, 0.0, data)
+            return FitState(force, motion, data.gain, equations, sought, data.markers, 0.0, data)
         gain, left = light.gain_after(higher, chosen.gain_sigma), light.unexplained(higher)
         height = data.moved_mm[light.nodes, 2] + higher
-        return FitState(force, motion, gain, equations, data.markers, left, data, height)
+        return FitState(force, motion, gain, equations, sought, data.markers, left, data, height)
 
     def offset(self, state: FitState) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
@@ -299,45 +321,27 @@ class JointEstimator:
             return None
         wide = self.lattice.widened(near, self.settings.light_reach)
         relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
-        finer, fine = None, finer_mm is not None
+        finer = None
         if self.finer is not None:
             finer = self.finer.seen(near, moved_mm, state.force_n, finer_mm)
+        close = None if finer_mm is None else self.lattice.widened(near, _CLOSE)
         at = self.light, frame.seen, self.lattice, moved_mm, wide
-        bins = placed_bins(*at, relief, finer, by_finer=fine)
+        bins = placed_bins(*at, relief, finer, close)
         chosen = settings_at(self.settings, self.deepness(state))
         error = math.hypot(chosen.light_error, chosen.light_share * rms_length(bins.change.T))
-        height = finer_mm if fine else moved_mm[:, 2]
+        height = moved_mm[:, 2] if finer_mm is None else finer_mm
         return bins.sums(self.law, height, state.gain, error)
 
     @cached_property
-    def _near_edge(self) -> Mask:
+    def near_edge(self) -> Mask:
         """(c,) nodes at the edge of the gel."""
         return edge_nodes(self.neighbours.sum(axis=1), self.lattice)
 
     def _found(self, frame: FrameData, seen: Mask, region: Mask, state: FitState) -> JointForces:
-        assert state.equations is not None
-        assert state.markers is not None
-        nodes = np.flatnonzero(region)
-        sums = np.reshape(self._rigid[:, nodes], (6, -1))
-        spread = state.equations.spread_of(sums, state.force_n[nodes].ravel())
-        covariance = at_edge(state.force_n, self.points_mm, self._near_edge, self.settings)
-        by_gel, markers = None, state.markers
-        by_marker = markers.response(spread, self.markers.mm_per_px)
-        if self.off_design is None:
-            covariance += spread @ sums.T - markers.overstated(spread)
-            height = self.nodes_to_markers @ state.displacement_mm[:, 2]
-            apparent = self.settings.height_share * self.by_height * height[:, None]
-            apparent *= min(-float(height.min(initial=0.0)) / self.deep_mm, 1.0)
-            covariance += by_heights(by_marker, self.markers.mm_per_px, apparent)
-        else:
-            force, hessian = state.force_n[nodes], state.equations.hessian
-            covariance += scaled_covariance(hessian, markers, sums, spread, force.ravel())
-            covariance += by_region(self._rigid, state.force_n, state.wider_n)
-            covariance += self.off_design.by_camera(markers, spread, state.displacement_mm[:, 2])
-            by_gel = self.off_design.by_parameter(markers, spread, nodes, force)
+        spread = wrench_spread(self, np.flatnonzero(region), state)
         return JointForces(
-            state.force_n, state.displacement_mm, region, seen, covariance, by_marker, by_gel,
-            state.gain, state.unexplained, self._shown(frame.seen), state.motion,
+            state.force_n, state.displacement_mm, region, seen, *spread, state.gain,
+            state.unexplained, self._shown(frame.seen), state.motion,
         )  # fmt: skip
 
     def _shown(self, seen: SeenLight | None) -> Mask:

@@ -5,9 +5,55 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from numba import njit
 
+from gelslim_force.joint.light_kernel import cubic
+from ifem_export.inverse.contact_fit_kernel import accelerated
+
 COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_TAPS = 4
+
+
+@njit(**COMPILED)
+def taps_of_two_pitches(
+    at: Any, step: Any, number: Any, close: Any, nodes: Any, along: Any, across: Any
+) -> None:
+    """Places (n, 16), and weights (n, 16) of slopes along x and y, of cubic convolution.
+
+    It is that of all places of a finer lattice where `close` says so, and that of every other one
+    elsewhere.
+
+    Args:
+        at: (n, 2) in steps of the finer lattice.
+        step: (2,) of the finer lattice.
+        number: (nx, ny) number of each place; -1 where there is none.
+        close: (nx, ny) places of the lattice of every other place, about which all are used.
+        nodes: Receives the places.
+        along: Receives the weights along x; 0 where there is no place.
+        across: Receives those along y.
+    """
+    rows, columns = number.shape
+    by_x, by_y = np.empty(_TAPS), np.empty(_TAPS)
+    steep_x, steep_y = np.empty(_TAPS), np.empty(_TAPS)
+    for k in range(len(at)):
+        row = min(max(round(at[k, 0] / 2), 0), close.shape[0] - 1)
+        column = min(max(round(at[k, 1] / 2), 0), close.shape[1] - 1)
+        stride = 1 if close[row, column] else 2
+        x, y = at[k, 0] / stride, at[k, 1] / stride
+        i = min(max(int(np.floor(x)), 0), (rows - 1) // stride - 1)
+        j = min(max(int(np.floor(y)), 0), (columns - 1) // stride - 1)
+        cubic(x - i, by_x, steep_x)
+        cubic(y - j, by_y, steep_y)
+        for a in range(_TAPS):
+            row = min(max(stride * (i + a - 1), 0), rows - 1)
+            for b in range(_TAPS):
+                node = number[row, min(max(stride * (j + b - 1), 0), columns - 1)]
+                tap = _TAPS * a + b
+                held = 1.0 if node >= 0 else 0.0
+                nodes[k, tap] = max(node, 0)
+                along[k, tap] = held * steep_x[a] * by_y[b] / (stride * step[0])
+                across[k, tap] = held * by_x[a] * steep_y[b] / (stride * step[1])
 
 
 @njit(**COMPILED)
@@ -21,17 +67,81 @@ def stencil_columns(
         at: (q, 2).
         places: (nx, ny) number of each place; -1 where there is none.
         rows: (f,) row of `found` of each place; -1 where it has none.
-        columns: (q,) of `found`.
+        columns: (q, s) of `found`, whose mean each force is.
         found: (m, k), to which the heights are added.
     """
-    reach = stencil.shape[0] // 2
+    reach, share = stencil.shape[0] // 2, 1 / columns.shape[1]
     for n in range(len(at)):
         row, column = at[n, 0] - reach, at[n, 1] - reach
         for a in range(max(-row, 0), min(stencil.shape[0], places.shape[0] - row)):
             for b in range(max(-column, 0), min(stencil.shape[1], places.shape[1] - column)):
                 place = places[row + a, column + b]
                 if place >= 0 and rows[place] >= 0:
-                    found[rows[place], columns[n]] += stencil[a, b]
+                    for source in columns[n]:
+                        found[rows[place], source] += share * stencil[a, b]
+
+
+@njit(**COMPILED)
+def columns_in_parts(rows: Any, corners: Any, source: Any, tangential: Any, found: Any) -> None:
+    """Columns of normal forces that split evenly on four nodes, and of tangential ones on nodes.
+
+    Args:
+        rows: (n, 3r) by the forces on r nodes.
+        corners: (f, 4) nodes of each normal force.
+        source: (f, 4) of the q unknown normal forces, whose mean each force is.
+        tangential: (p,) nodes with tangential forces.
+        found: Receives (n, q + 2p).
+    """
+    sixteenth, half = rows.dtype.type(1 / 16), found.shape[1] - 2 * len(tangential)
+    for i in range(len(rows)):
+        row, out = rows[i], found[i]
+        out[:half] = 0
+        for k in range(len(corners)):
+            value = row[3 * corners[k, 0] + 2] + row[3 * corners[k, 1] + 2]
+            value += row[3 * corners[k, 2] + 2] + row[3 * corners[k, 3] + 2]
+            if source[k, 0] == source[k, 3]:
+                out[source[k, 0]] += 4 * sixteenth * value
+                continue
+            for corner in range(4):
+                out[source[k, corner]] += sixteenth * value
+        for n in range(len(tangential)):
+            out[half + 2 * n] = row[3 * tangential[n]]
+            out[half + 2 * n + 1] = row[3 * tangential[n] + 1]
+
+
+@njit(**COMPILED)
+def add_smoothness(
+    places: Any, area: Any, roughness: Any, size: Any, source: Any, force: Any, hessian: Any,
+    slope: Any,
+) -> None:  # fmt: skip
+    """Add the prior of a smooth traction of limited size along one axis.
+
+    Args:
+        places: (f, 2) of the forces on a lattice; those one step apart are neighbours.
+        area: (f,) of the places.
+        roughness: Standard deviation of the difference of the traction of neighbours.
+        size: Standard deviation of the traction.
+        source: (f, 4) numbers of the unknown forces whose mean each force is.
+        force: (f,) as they are.
+        hessian: (k, k) of all unknown forces, to which it is added.
+        slope: (k,), to which its gradient is added.
+    """
+    for i in range(len(places)):
+        x, y, count, pull = places[i, 0], places[i, 1], 0, 0.0
+        for j in range(len(places)):
+            if abs(places[j, 0] - x) + abs(places[j, 1] - y) == 1:
+                count += 1
+                stiff = -1 / (roughness * roughness * area[i] * area[j])
+                pull += stiff * force[j]
+                for a in range(4):
+                    for b in range(4):
+                        hessian[source[i, a], source[j, b]] += stiff / 16
+        stiff = (count / (roughness * roughness) + 1 / (size * size)) / (area[i] * area[i])
+        pull += stiff * force[i]
+        for a in range(4):
+            slope[source[i, a]] += pull / 4
+            for b in range(4):
+                hessian[source[i, a], source[i, b]] += stiff / 16
 
 
 @njit(**COMPILED)
@@ -59,8 +169,7 @@ def descend(
 ) -> Any:
     """Improve `force` (q + 2p,) in place by accelerated projected gradients with restart.
 
-    Minimises slope·d + d·gram d / 2 over the change d of the force within the limits of `project`.
-    It ends after `most` steps, or when the relative change of a step is within `tolerance`.
+    It is `contact_fit_kernel.descend` within the limits of `project`.
 
     Returns:
         The relative change of the last step, and the number of steps.
@@ -73,17 +182,5 @@ def descend(
         steps += 1
         moved = ahead - step * (slope + gram @ (ahead - start))
         project(moved, limit)
-        overshoot = change_square = size = 0.0
-        for k in range(len(moved)):
-            delta = moved[k] - force[k]
-            overshoot += (ahead[k] - moved[k]) * delta
-            change_square += delta * delta
-            size += moved[k] * moved[k]
-        if overshoot > 0:
-            momentum = 1.0
-        last, momentum = momentum, (1 + math.sqrt(1 + 4 * momentum * momentum)) / 2
-        change = math.sqrt(change_square / size) if size > 0 else 0.0
-        for k in range(len(moved)):
-            ahead[k] = moved[k] + (last - 1) / momentum * (moved[k] - force[k])
-            force[k] = moved[k]
+        change, momentum = accelerated(moved, ahead, force, momentum)
     return change, steps

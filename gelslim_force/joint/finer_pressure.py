@@ -1,7 +1,7 @@
 """Normal forces at half the pitch of the nodes: what moves under a pressure that ends anywhere.
 
-A force on a place half way between nodes splits bilinearly on the nodes of its cell or edge, with
-the same resultant and moments, and moves the surface as these do, and as a stencil about its place.
+A force on a place half way between nodes splits evenly on the nodes of its cell or edge, with the
+same resultant and moments, and moves the surface as these do, and as a stencil about its place.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.responses import Responses
@@ -24,6 +23,40 @@ Nodes = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
+class PressureParts:
+    """Unknown forces of a contact: q normal ones at half the pitch, and tangential ones on nodes.
+
+    Attributes:
+        nodes: (p,) with tangential forces.
+        places: (f,) with normal forces.
+        source: (f, 4) numbers of the unknown normal forces whose mean that on a place is. Between
+            nodes inside a contact it follows from these; elsewhere all four are the same.
+        own: (q,) the place of each unknown normal force, as an entry of `places`.
+        bearing: (r,) nodes that bear some of the forces.
+    """
+
+    nodes: Nodes
+    places: Nodes
+    source: Nodes
+    own: Nodes
+    bearing: Nodes
+
+    @property
+    def size(self) -> int:
+        """Number of unknown components, q + 2p."""
+        return len(self.own) + 2 * len(self.nodes)
+
+    @property
+    def tangential(self) -> Nodes:
+        """(2p,) numbers of the tangential forces among all unknown ones, x and y in turns."""
+        return np.arange(len(self.own), self.size)
+
+    def normal(self, unknown: Array) -> Array:
+        """(f,) normal forces on the places by the unknown forces (q + 2p,)."""
+        return np.asarray(unknown[self.source].mean(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
 class FinerPressure:
     """Normal forces on the places of a finer surface.
 
@@ -31,12 +64,13 @@ class FinerPressure:
         surface: With f places for c nodes.
         stencils: (2, 2, 2r + 1, 2r + 1) in mm/N; see
             `ifem_export.compliance.finer_response.half_step_response`.
-        split: (f, c) share of each node in the force on a place.
+        corners: (f, 4) nodes that bear a quarter each of the force on a place; on an edge or a
+            node, some of them are the same one.
     """
 
     surface: FinerSurface
     stencils: Array
-    split: Any
+    corners: Nodes
 
     @classmethod
     def of(cls, surface: FinerSurface, stencils: Array) -> FinerPressure:
@@ -45,27 +79,34 @@ class FinerPressure:
         number = np.full(nodes.max(axis=0) // 2 + 1, -1, dtype=np.intp)
         number[tuple((nodes // 2).T)] = np.arange(len(nodes))
         first, past = place // 2, (place + 1) // 2
-        corners = [(a[:, 0], b[:, 1]) for a in (first, past) for b in (first, past)]
-        columns = np.stack([number[corner] for corner in corners], axis=1).ravel()
-        rows = np.repeat(np.arange(len(place)), len(corners))
-        weight = np.full(len(rows), 1 / len(corners))
-        size = (len(place), len(nodes))
-        return cls(surface, stencils, sparse.csr_array((weight, (rows, columns)), shape=size))
+        corners = [number[a[:, 0], b[:, 1]] for a in (first, past) for b in (first, past)]
+        return cls(surface, stencils, np.stack(corners, axis=1))
 
     def about(self, nodes: Nodes) -> Nodes:
         """(q,) places whose force splits on one of the nodes (p,), or on more of them."""
-        mask = np.zeros(self.split.shape[1])
-        mask[nodes] = 1.0
-        return np.flatnonzero(self.split @ mask)
+        chosen = np.zeros(len(self.surface.place), dtype=bool)
+        chosen[nodes] = True
+        return np.flatnonzero(chosen[self.corners].any(axis=1))
+
+    def between(self, places: Nodes, values: Array) -> Array:
+        """(q,) values at places as means of those of the nodes (c,)."""
+        return np.asarray(values[self.corners[places]].mean(axis=1))
 
     def forces(self, places: Nodes, force_n: Array) -> Array:
         """(q,) forces on places whose traction is that between nodes with normal forces (c,).
 
         Their sum is that of all normal forces.
         """
-        found = self.split[places] @ force_n
+        found = self.between(places, force_n)
         total = float(found.sum())
         return np.asarray(found * (force_n.sum() / total if total else 0.0))
+
+    def on_nodes(self, places: Nodes, force_n: Array) -> Array:
+        """(c,) forces on the nodes by those on places (q,)."""
+        corners = self.corners[places]
+        share = np.repeat(force_n / corners.shape[1], corners.shape[1])
+        count = len(self.surface.place)
+        return np.asarray(np.bincount(corners.ravel(), share, count), dtype=float)
 
     def heights(self, moved: Array, tangential: tuple[Nodes, Array], normal: Any) -> Array:
         """Heights (f,) of all places.
@@ -87,38 +128,62 @@ class FinerPressure:
             add_stencils(stencil, at[some], force, number, found)
         return found
 
-    def by_force(self, responses: Responses, near: Nodes, nodes: Nodes, places: Nodes) -> Single:
-        """(m, q + 2p) heights of places by normal forces (q,) and tangential ones (p, 2).
+    def by_force(self, responses: Responses, near: Nodes, parts: PressureParts) -> Single:
+        """(m, q + 2p) heights of places `near` (m,) by the unknown forces.
 
         Args:
             responses: Of the nodes.
             near: (m,) places of the heights.
-            nodes: (p,) with tangential forces.
-            places: (q,) with normal forces.
+            parts: What is unknown.
         """
         from gelslim_force.joint.finer_kernel import stencil_columns
 
         lattice = self.surface.lattice
-        split = self.split[places]
-        bearing = np.unique(np.concatenate([split.indices, nodes]))
         interpolation = self.surface.interpolation[near]
         seen = np.unique(interpolation.indices)
-        rough = in_parts(
-            responses.of_heights(bearing, seen), split[:, bearing], np.searchsorted(bearing, nodes)
-        )
-        single = interpolation[:, seen].astype(np.float32)
-        found = np.ascontiguousarray(single @ rough)
+        rough = self.in_parts(responses.of_heights(parts.bearing, seen), parts)
+        found = np.ascontiguousarray(interpolation[:, seen].astype(np.float32) @ rough)
         number = np.full(len(lattice.place), -1, dtype=np.intp)
         number[near] = np.arange(len(near))
-        at, count = lattice.place[places], len(places)
+        at = lattice.place[parts.places]
+        alone = (parts.source == parts.source[:, :1]).all(axis=1)
         for stencil, some in self._by_stencil(at):
-            stencil_columns(stencil[..., 2], at[some], lattice.number, number, some, found)
+            for own, width in ((alone[some], 1), (~alone[some], 4)):
+                which = some[own]
+                columns = np.ascontiguousarray(parts.source[which, :width])
+                stencil_columns(stencil[..., 2], at[which], lattice.number, number, columns, found)
+        at = self.surface.place[parts.nodes]
         for axis in (0, 1):
-            columns = count + 2 * np.arange(len(nodes)) + axis
+            columns = parts.tangential[axis::2, None]
             stencil = self.surface.stencil[..., axis]
-            at = self.surface.place[nodes]
             stencil_columns(stencil, at, lattice.number, number, columns, found)
         return found
+
+    def in_parts(self, rows: Any, parts: PressureParts) -> Any:
+        """Columns (n, q + 2p) of the unknown forces by those (n, 3r) of forces on `bearing`."""
+        from gelslim_force.joint.finer_kernel import columns_in_parts
+
+        corners = np.searchsorted(parts.bearing, self.corners[parts.places])
+        nodes = np.searchsorted(parts.bearing, parts.nodes)
+        found = np.empty((len(rows), parts.size), dtype=rows.dtype)
+        columns_in_parts(rows, corners, parts.source, nodes, found)
+        return found
+
+    def parts(self, nodes: Nodes, inner: Mask) -> PressureParts:
+        """Unknown forces about nodes (p,), of which those marked in (c,) are inside the contact."""
+        places, number = self.about(nodes), np.zeros(len(inner), dtype=np.intp)
+        corners, between = self.corners[places], self._between[places]
+        follows = between & inner[corners].all(axis=1)
+        sought = np.cumsum(~follows) - 1
+        number[corners[~between, 0]] = sought[~between]
+        source = np.where(follows[:, None], number[corners], sought[:, None])
+        bearing = np.unique(np.concatenate([corners.ravel(), nodes]))
+        return PressureParts(nodes, places, source, np.flatnonzero(~follows), bearing)
+
+    @cached_property
+    def _between(self) -> Mask:
+        """(f,) places that are not on a node."""
+        return np.asarray((self.surface.lattice.place % 2).any(axis=1))
 
     @cached_property
     def _stencils(self) -> Array:
@@ -133,16 +198,3 @@ class FinerPressure:
             (self._stencils[odd], np.flatnonzero((at % 2 == odd).all(axis=1)))
             for odd in np.ndindex(2, 2)
         ]
-
-
-def in_parts(rows: Single, split: Any, tangential: Nodes) -> Single:
-    """Columns (n, q + 2p) of forces at half the pitch by those of nodes.
-
-    Args:
-        rows: (n, 3r) by the forces on r nodes.
-        split: (q, r) share of the nodes in each normal force.
-        tangential: (p,) which of the nodes have tangential forces.
-    """
-    columns = np.add.outer(3 * tangential, (0, 1)).ravel()
-    normal = (split.astype(np.float32) @ np.ascontiguousarray(rows[:, 2::3].T)).T
-    return np.hstack([normal, rows[:, columns]])

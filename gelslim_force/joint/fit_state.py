@@ -66,6 +66,19 @@ class GelMotion:
 
 
 @dataclass(frozen=True, eq=False)
+class SoughtForces:
+    """The q forces that equations seek.
+
+    Attributes:
+        sums: (6, q) force, and torque about the origin, by 1 N of each.
+        free: (q,) those that vary; the others stay 0.
+    """
+
+    sums: Array
+    free: Mask
+
+
+@dataclass(frozen=True, eq=False)
 class FitState:
     """An estimate.
 
@@ -74,6 +87,7 @@ class FitState:
         motion: Of the surface nodes.
         gain: Of the light.
         equations: That it solves; None for a start.
+        sought: Forces of these equations; None for a start.
         markers: Data of the markers that it explains; None for a start.
         unexplained: Share of the change of light that is left.
         data: Linear data that it solves; None for a start.
@@ -85,6 +99,7 @@ class FitState:
     motion: GelMotion
     gain: float
     equations: NormalEquations | None = None
+    sought: SoughtForces | None = None
     markers: MarkerRows | None = None
     unexplained: float = 0.0
     data: Linearised | None = None

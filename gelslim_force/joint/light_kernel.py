@@ -13,7 +13,7 @@ _TAPS = 4
 
 
 @njit(**COMPILED)
-def _cubic(t: Any, weight: Any, steep: Any) -> None:
+def cubic(t: Any, weight: Any, steep: Any) -> None:
     """Weights (4,) of cubic convolution at the fraction t of a cell, and their derivatives."""
     weight[0] = -0.5 * t + t * t - 0.5 * t * t * t
     weight[1] = 1 - 2.5 * t * t + 1.5 * t * t * t
@@ -43,8 +43,8 @@ def cubic_taps(at: Any, step: Any, number: Any, nodes: Any, along: Any, across: 
     for k in range(len(at)):
         i = min(max(int(np.floor(at[k, 0])), 0), rows - 2)
         j = min(max(int(np.floor(at[k, 1])), 0), columns - 2)
-        _cubic(at[k, 0] - i, by_x, steep_x)
-        _cubic(at[k, 1] - j, by_y, steep_y)
+        cubic(at[k, 0] - i, by_x, steep_x)
+        cubic(at[k, 1] - j, by_y, steep_y)
         for a in range(_TAPS):
             row = min(max(i + a - 1, 0), rows - 1)
             for b in range(_TAPS):

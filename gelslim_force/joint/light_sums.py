@@ -154,12 +154,13 @@ def placed_bins(
     near: Mask,
     relief: Array | None = None,
     finer: tuple[NodeLattice, Array] | None = None,
-    by_finer: bool = False,
+    close: Mask | None = None,
 ) -> PlacedBins:
     """The valid bins of a frame among the nodes `near` (c,), with the `relief` (c, k) of the nodes.
 
     `finer` is a finer lattice with the heights (f,) of its places, from which present slopes come.
-    With `by_finer` their derivatives are those by these heights, too.
+    Their derivatives are those by the heights of the nodes; or, about the nodes `close` (c,) if
+    they are given, by those of all places, and elsewhere by those of every other place.
 
     The line of sight of a bin meets the surface where it is now; the motion (c, 3) of the nodes
     leads from there to the place at rest. Slopes are those of the deformed surface.
@@ -172,10 +173,13 @@ def placed_bins(
     taps, slope = lattice.slopes_at(places), None
     if finer is None:
         taps = taps.on_deformed(displacement_mm[:, :2])
-    else:
+    elif close is None:
         turn, flat = taps.turn(displacement_mm[:, :2]), finer[0].slopes_at(places)
         slope = np.einsum("nij,nj->ni", turn, flat.slopes(finer[1]))
-        taps = flat.turned(turn) if by_finer else taps.on_deformed(displacement_mm[:, :2])
+        taps = taps.on_deformed(displacement_mm[:, :2])
+    else:
+        flat = finer[0].slopes_about(places, lattice.picture(close))
+        taps = flat.turned(taps.turn(displacement_mm[:, :2]))
     return PlacedBins(
         taps,
         of(seen.log_change),

@@ -63,40 +63,40 @@ class MarkerRows:
         """Change (6, m, 2) per mm of six sums of the forces where a used marker moves further.
 
         Args:
-            spread: (6, 3p) product of the sums with the covariance of the forces.
+            spread: (6, q) product of the sums with the covariance of the forces. It is taken in
+                the precision of the rows, which are not converted.
         """
-        by_mm = self._product(spread) * self.weight
+        by_mm = (spread.astype(self.rows.dtype) @ self.rows.T) * self.weight
         return np.asarray(by_mm.reshape(len(spread), -1, 2))
 
-    def response(self, spread: Array, mm_per_px: Array) -> Array:
+    def response(self, by_motion: Array, mm_per_px: Array) -> Array:
         """Change (6, n, 2) per px of six sums of the forces where a marker is seen elsewhere.
 
         Args:
-            spread: As in `by_motion`.
+            by_motion: As found by the method of this name.
             mm_per_px: (n, 2, 2) of the markers.
         """
-        found = np.zeros((len(spread), len(mm_per_px), 2))
-        by_mm = self.by_motion(spread)
+        found = np.zeros((len(by_motion), len(mm_per_px), 2))
         scale = mm_per_px[self.used]
-        found[:, self.used] = by_mm[..., :1] * scale[:, 0] + by_mm[..., 1:] * scale[:, 1]
+        found[:, self.used] = by_motion[..., :1] * scale[:, 0] + by_motion[..., 1:] * scale[:, 1]
         return found
 
-    def overstated(self, spread: Array) -> Array:
+    def overstated(self, by_motion: Array, varied: int) -> Array:
         """Part (6, 6) of the covariance of the sums that the residuals show to be too large.
 
         The weights hold errors of mesh and print that not every contact has. Where the residuals
         are smaller than the weights expect, the variance of the markers is that of the residuals:
         K. R. Koch, "Parameter estimation and hypothesis testing in linear models", 1999, §3.6,
-        on variance components. `spread` is as in `response`.
-        """
-        count = len(self.residual) - int(np.count_nonzero(spread.any(axis=0)))
-        seen = float(self.weight @ np.square(self.residual)) / max(count, 1)
-        gain = self._product(spread) * np.sqrt(self.weight)
-        return np.asarray(max(0.0, 1.0 - seen) * gain @ gain.T)
+        on variance components.
 
-    def _product(self, spread: Array) -> Any:
-        """(6, 2m) in the precision of the rows, which are not converted."""
-        return spread.astype(self.rows.dtype) @ self.rows.T
+        Args:
+            by_motion: As found by the method of this name.
+            varied: Number of components of the forces that vary.
+        """
+        count = len(self.residual) - varied
+        seen = float(self.weight @ np.square(self.residual)) / max(count, 1)
+        gain = by_motion.reshape(len(by_motion), -1) / np.sqrt(self.weight)
+        return np.asarray(max(0.0, 1.0 - seen) * gain @ gain.T)
 
 
 def rms_length(rows: Array) -> float:

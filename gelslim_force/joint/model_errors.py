@@ -1,16 +1,58 @@
-"""What the model leaves out of the forces of an unknown shape, as covariance of their wrench."""
+"""Covariance of the wrench of an unknown shape: by its data, and by what the model leaves out."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.variance_components import scaled_covariance
+
+if TYPE_CHECKING:
+    from gelslim_force.joint.estimator import JointEstimator
+    from gelslim_force.joint.fit_state import FitState
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Nodes = NDArray[np.intp]
 _EDGE_STEPS = 2
+
+
+def wrench_spread(
+    estimator: JointEstimator, nodes: Nodes, state: FitState
+) -> tuple[Array, Array, Array | None]:
+    """`covariance`, `by_marker` and `by_gel` of `JointForces`.
+
+    Args:
+        estimator: Which found the state.
+        nodes: (p,) in contact.
+        state: The estimate.
+    """
+    equations, sought, markers = state.equations, state.sought, state.markers
+    assert equations is not None
+    assert sought is not None
+    assert markers is not None
+    settings, off_design = estimator.settings, estimator.off_design
+    spread = equations.spread_of(sought.sums, sought.free)
+    covariance = at_edge(state.force_n, estimator.points_mm, estimator.near_edge, settings)
+    by_motion, height = markers.by_motion(spread), state.displacement_mm[:, 2]
+    by_marker = markers.response(by_motion, estimator.markers.mm_per_px)
+    if off_design is None:
+        varied = int(np.count_nonzero(sought.free))
+        covariance += spread @ sought.sums.T - markers.overstated(by_motion, varied)
+        dent = estimator.nodes_to_markers @ height
+        apparent = settings.height_share * estimator.by_height * dent[:, None]
+        apparent *= min(-float(dent.min(initial=0.0)) / estimator.deep_mm, 1.0)
+        covariance += by_heights(by_motion, apparent[markers.used])
+        return covariance, by_marker, None
+    force = state.force_n[nodes]
+    covariance += scaled_covariance(equations.hessian, markers, sought.sums, spread, force.ravel())
+    covariance += by_region(estimator.rigid, state.force_n, state.wider_n)
+    covariance += off_design.by_camera(markers, spread, height)
+    return covariance, by_marker, off_design.by_parameter(markers, spread, nodes, force)
 
 
 def edge_nodes(neighbour_count: NDArray[np.float64], lattice: NodeLattice) -> Mask:
@@ -37,19 +79,17 @@ def at_edge(force_n: Array, points_mm: Array, near: Mask, settings: JointSetting
     return np.asarray(size**2 * along.T @ along)
 
 
-def by_heights(by_marker: Array, mm_per_px: Array, apparent_mm: Array) -> Array:
+def by_heights(by_motion: Array, apparent_mm: Array) -> Array:
     """(6, 6) by an error of the heights that all markers in a dent have in common.
 
     The camera looks at the gel at an angle, so that markers at wrong heights seem to have moved
     aside, all to the same side: a shear without a force.
 
     Args:
-        by_marker: (6, n, 2) change of the wrench per px by which a marker is seen elsewhere.
-        mm_per_px: (n, 2, 2) of the markers.
-        apparent_mm: (n, 2) lateral motion that the picture shows of a standard deviation of theirs.
+        by_motion: (6, m, 2) change of the wrench per mm by which a marker is seen elsewhere.
+        apparent_mm: (m, 2) lateral motion that the picture shows of a standard deviation of theirs.
     """
-    seen_px = np.linalg.solve(mm_per_px, apparent_mm[:, :, None])[:, :, 0]
-    change = np.einsum("anj,nj->a", by_marker, seen_px)
+    change = np.einsum("amj,mj->a", by_motion, apparent_mm)
     return np.outer(change, change)
 
 

@@ -60,7 +60,10 @@ class SlopeTaps:
 
     def turned(self, turn: Array) -> SlopeTaps:
         """The slopes times matrices (n, 2, 2)."""
-        along, across = np.einsum("nij,jnk->ink", turn, np.stack([self.along, self.across]))
+        from gelslim_force.joint.place_kernel import turn_slopes
+
+        along, across = self.along.copy(), self.across.copy()
+        turn_slopes(along, across, turn)
         return SlopeTaps(self.nodes, along, across)
 
     def turn(self, lateral_mm: Array) -> Array:
@@ -156,6 +159,21 @@ class NodeLattice:
         nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)
         along, across = np.empty(nodes.shape), np.empty(nodes.shape)
         cubic_taps(at, self.step_mm, self.number, nodes, along, across)
+        return SlopeTaps(nodes, along, across)
+
+    def slopes_about(self, points_mm: Array, close: Mask) -> SlopeTaps:
+        """Slopes at (n, 2) by the heights of every other place, and of all where it matters.
+
+        Args:
+            points_mm: (n, 2).
+            close: (mx, my) places of the lattice of every other place, about which all are used.
+        """
+        from gelslim_force.joint.finer_kernel import taps_of_two_pitches
+
+        at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
+        nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)
+        along, across = np.empty(nodes.shape), np.empty(nodes.shape)
+        taps_of_two_pitches(at, self.step_mm, self.number, close, nodes, along, across)
         return SlopeTaps(nodes, along, across)
 
     def interpolation(self, points_mm: Array) -> sparse.csr_array:

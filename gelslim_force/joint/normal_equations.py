@@ -105,34 +105,32 @@ class NormalEquations:
         add_prior(neighbours, area_mm2, roughness_mpa, sizes, start, hessian, slope)
         return NormalEquations(hessian, slope)
 
-    def solved(self, start: Array, friction: float) -> Array:
-        """(3p,) forces in Coulomb's cone that minimise, from those at the start (3p,)."""
+    def solved(self, start: Array, friction: float, tolerance: float = TOLERANCE) -> Array:
+        """(3p,) forces in Coulomb's cone that minimise, from those at the start (3p,).
+
+        The relative change of the last step is within the tolerance.
+        """
         from ifem_export.inverse.contact_fit_kernel import descend, largest_eigenvalue
 
         gram, slope = (a.astype(np.float32) for a in (self.hessian, self.slope))
         step = 1.0 / (_MARGIN * largest_eigenvalue(gram))
         force = start.astype(np.float32)
-        descend(gram, slope, force, friction, np.float32(step), TOLERANCE, STEPS)
+        descend(gram, slope, force, friction, np.float32(step), tolerance, STEPS)
         return force.astype(float)
 
-    def spread_of(self, sums: Array, force: Array) -> Array:
-        """Product (k, 3p) of linear functions `sums` (k, 3p) of the forces with their covariance.
+    def spread_of(self, sums: Array, free: NDArray[np.bool_]) -> Array:
+        """Product (k, q) of linear functions `sums` (k, q) of the forces with their covariance.
 
-        Nodes that do not press stay free of force, and the others vary in all components.
+        Only forces that are `free` (q,) vary.
         """
-        pressing = np.repeat(force.reshape(-1, 3)[:, 2] < 0, 3)
         found = np.zeros(sums.shape)
-        if pressing.any():
-            free = np.flatnonzero(pressing)
-            block = np.ascontiguousarray(self.hessian[free][:, free])
+        if free.any():
+            varied = np.flatnonzero(free)
+            block = np.ascontiguousarray(self.hessian[varied][:, varied])
             # The transposed block, which is the same one, is in the order of LAPACK.
             factor = cho_factor(block.T, overwrite_a=True, check_finite=False)
-            found[:, free] = cho_solve(factor, sums[:, free].T, check_finite=False).T
+            found[:, varied] = cho_solve(factor, sums[:, varied].T, check_finite=False).T
         return found
-
-    def covariance_of(self, sums: Array, force: Array) -> Array:
-        """Covariance (k, k) of linear functions `sums` (k, 3p) of the forces (3p,)."""
-        return np.asarray(self.spread_of(sums, force) @ sums.T)
 
 
 @dataclass(frozen=True, eq=False)

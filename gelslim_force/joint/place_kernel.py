@@ -146,6 +146,16 @@ def turn_taps(
 
 
 @njit(**COMPILED)
+def turn_slopes(along: Any, across: Any, turn: Any) -> None:
+    """Multiply slopes, the weights (n, 16) along x and y, by matrices (n, 2, 2) in place."""
+    for k in range(len(turn)):
+        for tap in range(along.shape[1]):
+            a, b = along[k, tap], across[k, tap]
+            along[k, tap] = turn[k, 0, 0] * a + turn[k, 0, 1] * b
+            across[k, tap] = turn[k, 1, 0] * a + turn[k, 1, 1] * b
+
+
+@njit(**COMPILED)
 def mark_adjacent(places: Any, found: Any) -> None:
     """Set `found` (p, p) to 1 where two of the places (p, 2) are one step along an axis apart."""
     for i in range(len(places)):

@@ -12,116 +12,141 @@ tractions grows with the number of places, 4, so that the size of each may be tw
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.joint.deepness import roughness_mpa
-from gelslim_force.joint.finer_pressure import in_parts
-from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion
-from gelslim_force.joint.normal_equations import NormalEquations
+from gelslim_force.joint.finer_pressure import FinerPressure, PressureParts
+from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, SoughtForces
+from gelslim_force.joint.normal_equations import STEPS, NormalEquations
 
 if TYPE_CHECKING:
     from gelslim_force.joint.estimator import JointEstimator
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-_MARGIN = 1.05
-_TOLERANCE, _STEPS = 1e-4, 400
+_MARGIN, _TOLERANCE = 1.05, 3e-4
 _SIZES = 2.0
 """Standard deviation of the pressure on a place over that on a node."""
 
 
 def refined(estimator: JointEstimator, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
-    """The estimate with normal forces at half the pitch; the same one without light.
-
-    Its equations, and with them the covariance, remain those of forces on the nodes.
+    """The estimate with normal forces at half the pitch; the same one where nothing presses.
 
     Args:
-        estimator: Which found the state.
-        frame: The data.
+        estimator: Which found the state, with normal forces at half the pitch.
+        frame: The data, with light.
         nodes: (p,) that may press.
-        state: The estimate on these nodes.
+        state: An estimate, in which more nodes may press.
 
     Raises:
         IfemError: The strained law does not converge.
     """
-    pressure, responses = estimator.pressure, estimator.responses
-    if pressure is None or frame.seen is None or not state.force_n[nodes, 2].any():
+    pressure = estimator.pressure
+    if pressure is None or not state.force_n[nodes, 2].any():
         return state
-    places = pressure.about(nodes)
-    split = pressure.split[places]
-    bearing = np.unique(np.concatenate([split.indices, nodes]))
-    near = np.zeros((2, len(state.force_n)), dtype=bool)
-    near[0, nodes] = near[1, bearing] = True
+    outside = np.ones(len(estimator.points_mm), dtype=bool)
+    outside[nodes] = False
+    # The rim of a deep contact is steep.
+    ring = 1 if estimator.deepness(state) > 0 else 0
+    inner = ~estimator.lattice.widened(outside, ring)
+    return _Refinement(estimator, pressure, pressure.parts(nodes, inner)).of(frame, state)
 
-    def on_nodes(normal: Array, tangential: Array) -> Array:
-        force = np.zeros_like(state.force_n)
-        force[nodes, :2] = tangential
-        force[:, 2] = split.T @ normal
+
+@dataclass(frozen=True, eq=False)
+class _Refinement:
+    """A linearisation with the forces of `parts` unknown."""
+
+    estimator: JointEstimator
+    pressure: FinerPressure
+    parts: PressureParts
+
+    def of(self, frame: FrameData, state: FitState) -> FitState:
+        """The estimate."""
+        estimator, pressure, parts = self.estimator, self.pressure, self.parts
+        responses, nodes, bearing = estimator.responses, parts.nodes, parts.bearing
+        before = self._before(state)
+        start, offset = self._on_nodes(before), estimator.offset(state)
+        moved = responses.displacement(bearing, start[bearing]) + offset
+        normal = parts.places, parts.normal(before)
+        height = pressure.heights(moved[:, 2], (nodes, start[nodes, :2]), normal)
+        light = estimator.light_sums(frame, _mask(start, nodes), moved, state, height)
+        assert light is not None
+        heights = pressure.by_force(responses, light.nodes, parts)
+        markers = estimator.marker_rows(frame, _mask(start, bearing), moved)
+        markers = replace(markers, rows=pressure.in_parts(markers.rows, parts))
+        gain = 1 - state.gain, estimator.settings.gain_sigma
+        equations = NormalEquations.of(parts.size)
+        equations = equations.with_rows(markers.rows, markers.residual, markers.weight)
+        equations = self._with_prior(equations.with_light(light, heights, gain), state, before)
+        friction = estimator.settings.friction
+        found = _solved(equations, before, friction * np.maximum(-state.force_n[nodes, 2], 0.0))
+        force = self._on_nodes(found)
+        force[nodes, :2] *= _share_in_cone(force[nodes], friction)[:, None]
+        higher = (heights @ (found - before).astype(heights.dtype)).astype(float)
+        return FitState(
+            force,
+            GelMotion(responses, bearing, force[bearing], offset),
+            light.gain_after(higher, gain[1]),
+            equations,
+            self._sought(found, force),
+            markers.after(found - before),
+            light.unexplained(higher),
+        )
+
+    def _before(self, state: FitState) -> Array:
+        """(q + 2p,) unknown forces that are nearest to an estimate on the nodes that may press."""
+        parts, held = self.parts, np.zeros(len(state.force_n))
+        held[parts.nodes] = state.force_n[parts.nodes, 2]
+        normal = self.pressure.forces(parts.places, held)[parts.own]
+        return np.concatenate([normal, state.force_n[parts.nodes, :2].ravel()])
+
+    def _on_nodes(self, unknown: Array) -> Array:
+        """Forces (c, 3) on all nodes by the unknown ones (q + 2p,)."""
+        parts, force = self.parts, np.zeros((len(self.estimator.points_mm), 3))
+        force[parts.nodes, :2] = unknown[parts.tangential].reshape(-1, 2)
+        force[:, 2] = self.pressure.on_nodes(parts.places, parts.normal(unknown))
         return force
 
-    normal = pressure.forces(places, state.force_n[:, 2])
-    tangential = state.force_n[nodes, :2]
-    start, offset = on_nodes(normal, tangential), estimator.offset(state)
-    moved = responses.displacement(bearing, start[bearing]) + offset
-    height = pressure.heights(moved[:, 2], (nodes, tangential), (places, normal))
-    light = estimator.light_sums(frame, near[0], moved, state, height)
-    assert light is not None
-    heights = pressure.by_force(responses, light.nodes, nodes, places)
-    markers = estimator.marker_rows(frame, near[1], moved)
-    rows = in_parts(markers.rows, split[:, bearing], np.searchsorted(bearing, nodes))
-    gain = 1 - state.gain, estimator.settings.gain_sigma
-    equations = NormalEquations.of(rows.shape[1])
-    equations = equations.with_rows(rows, markers.residual, markers.weight)
-    before = np.concatenate([normal, tangential.ravel()])
-    equations = _with_prior(
-        equations.with_light(light, heights, gain), estimator, nodes, places, state, before
-    )
-    friction = estimator.settings.friction
-    limit = friction * np.maximum(-state.force_n[nodes, 2], 0.0)
-    found = _solved(equations, before, limit)
-    gained = light.gain_after(heights @ (found - before).astype(heights.dtype), gain[1])
-    normal, tangential = found[: len(places)], found[len(places) :].reshape(-1, 2)
-    force = on_nodes(normal, tangential)
-    force[nodes, :2] *= _share_in_cone(force[nodes], friction)[:, None]
-    motion = GelMotion(responses, bearing, force[bearing], offset)
-    return replace(state, force_n=force, motion=motion, gain=gained, height_mm=None)
+    def _sought(self, unknown: Array, force: Array) -> SoughtForces:
+        """What was sought, with forces found (q + 2p,) that are (c, 3) on all nodes."""
+        parts, rigid = self.parts, self.estimator.rigid
+        sums = self.pressure.in_parts(rigid[:, parts.bearing].reshape(len(rigid), -1), parts)
+        pushes = np.repeat(force[parts.nodes, 2] < 0, 2)
+        return SoughtForces(sums, np.concatenate([unknown[: len(parts.own)] < 0, pushes]))
+
+    def _with_prior(
+        self, equations: NormalEquations, state: FitState, before: Array
+    ) -> NormalEquations:
+        """With smooth tractions of limited size, for forces `before` (q + 2p,)."""
+        from gelslim_force.joint.finer_kernel import add_smoothness
+
+        estimator, parts, nodes = self.estimator, self.parts, self.parts.nodes
+        chosen, young, area = estimator.settings, estimator.youngs_modulus_mpa, estimator.area_mm2
+        mean = -state.force_n[nodes, 2] / area[nodes]
+        rough = roughness_mpa(chosen, estimator.deepness(state), young, mean)
+        hessian, slope = equations.hessian.copy(), equations.slope.copy()
+        # Inside, a place has a quarter of the area of a node.
+        share = self.pressure.between(parts.places, area) / 4
+        at, size = self.pressure.surface.lattice.place[parts.places], _SIZES * chosen.normal_stress
+        given = rough, size * young, parts.source, parts.normal(before), hessian, slope
+        add_smoothness(at, share, *given)
+        at, size = estimator.lattice.place[nodes], chosen.tangential_stress
+        for axis in (0, 1):
+            own = parts.tangential[axis::2]
+            alone = np.repeat(own[:, None], 4, axis=1)
+            given = rough, size * young, alone, before[own], hessian, slope
+            add_smoothness(at, area[nodes], *given)
+        return NormalEquations(hessian, slope)
 
 
-def _with_prior(
-    equations: NormalEquations,
-    estimator: JointEstimator,
-    nodes: Nodes,
-    places: Nodes,
-    state: FitState,
-    before: Array,
-) -> NormalEquations:
-    """With smooth tractions of limited size, for forces `before` (q + 2p,)."""
-    pressure, chosen = estimator.pressure, estimator.settings
-    assert pressure is not None
-    young, area = estimator.youngs_modulus_mpa, estimator.area_mm2
-    mean = -state.force_n[nodes, 2] / area[nodes]
-    rough = roughness_mpa(chosen, estimator.deepness(state), young, mean)
-    # Inside, a place has a quarter of the area of a node.
-    finer = pressure.split[places] @ area / 4
-    adjacent = pressure.surface.lattice.adjacent(places)
-    prior, count = np.zeros_like(equations.hessian), len(places)
-    prior[:count, :count] = _smooth(adjacent, finer, rough, _SIZES * chosen.normal_stress * young)
-    size = chosen.tangential_stress * young
-    for axis in (0, 1):
-        own = slice(count + axis, None, 2)
-        prior[own, own] = _smooth(estimator.lattice.adjacent(nodes), area[nodes], rough, size)
-    return NormalEquations(equations.hessian + prior, equations.slope + prior @ before)
-
-
-def _smooth(adjacent: Array, area_mm2: Array, rough_mpa: float, size_mpa: float) -> Array:
-    """(n, n) of tractions whose neighbours, marked in (n, n), differ by `rough_mpa`."""
-    laplacian = np.diag(adjacent.sum(axis=1)) - adjacent
-    found = laplacian / rough_mpa**2 + np.eye(len(adjacent)) / size_mpa**2
-    return np.asarray(found / np.outer(area_mm2, area_mm2))
+def _mask(force: Array, nodes: Nodes) -> NDArray[np.bool_]:
+    found = np.zeros(len(force), dtype=bool)
+    found[nodes] = True
+    return found
 
 
 def _solved(equations: NormalEquations, before: Array, limit: Array) -> Array:
@@ -132,7 +157,7 @@ def _solved(equations: NormalEquations, before: Array, limit: Array) -> Array:
         a.astype(np.float32) for a in (equations.hessian, equations.slope, before, limit)
     )
     step = np.float32(1.0 / (_MARGIN * largest_eigenvalue(gram)))
-    descend(gram, slope, force, most, step, _TOLERANCE, _STEPS)
+    descend(gram, slope, force, most, step, _TOLERANCE, STEPS)
     return force.astype(float)
 
 

@@ -60,6 +60,37 @@ def project(force: Any, friction: Any) -> None:
 
 
 @njit(**COMPILED)
+def accelerated(moved: Any, ahead: Any, force: Any, momentum: Any) -> Any:
+    """Take a step of an accelerated descent, and look ahead along it.
+
+    Y. Nesterov, Soviet Mathematics Doklady 27, 1983, with the restart of B. O'Donoghue and
+    E. Candès, Foundations of Computational Mathematics 15, 2015: it begins anew where the step
+    goes against the gradient at the point looked ahead to.
+
+    Args:
+        moved: (n,) where the step from `ahead` leads.
+        ahead: (n,), which receives the next point to step from.
+        force: (n,), which receives `moved`.
+        momentum: After the step before; 1 at the start.
+
+    Returns:
+        The relative change of the step, and the momentum after it.
+    """
+    overshoot = change_square = size = 0.0
+    for k in range(len(moved)):
+        delta = moved[k] - force[k]
+        overshoot += (ahead[k] - moved[k]) * delta
+        change_square += delta * delta
+        size += moved[k] * moved[k]
+    last = 1.0 if overshoot > 0 else momentum
+    momentum = (1 + math.sqrt(1 + 4 * last * last)) / 2
+    for k in range(len(moved)):
+        ahead[k] = moved[k] + (last - 1) / momentum * (moved[k] - force[k])
+        force[k] = moved[k]
+    return math.sqrt(change_square / size) if size > 0 else 0.0, momentum
+
+
+@njit(**COMPILED)
 def descend(
     gram: Any, slope: Any, force: Any, friction: Any, step: Any, tolerance: Any, most: Any
 ) -> Any:
@@ -77,17 +108,5 @@ def descend(
         steps += 1
         moved = ahead - step * (slope + gram @ (ahead - start))
         project(moved, friction)
-        overshoot = change_square = size = 0.0
-        for k in range(len(moved)):
-            delta = moved[k] - force[k]
-            overshoot += (ahead[k] - moved[k]) * delta
-            change_square += delta * delta
-            size += moved[k] * moved[k]
-        if overshoot > 0:
-            momentum = 1.0
-        last, momentum = momentum, (1 + math.sqrt(1 + 4 * momentum * momentum)) / 2
-        change = math.sqrt(change_square / size) if size > 0 else 0.0
-        for k in range(len(moved)):
-            ahead[k] = moved[k] + (last - 1) / momentum * (moved[k] - force[k])
-            force[k] = moved[k]
+        change, momentum = accelerated(moved, ahead, force, momentum)
     return change, steps

@@ -47,10 +47,31 @@ def places_mm() -> Array:
 
 def test_split_has_the_same_resultant_and_moments() -> None:
     nodes = np.asarray(sensor_bundle().mesh.surface_mm)[:, :2]
-    split = pressure().split
-    np.testing.assert_allclose(split.sum(axis=1), 1.0, atol=1e-12)
-    np.testing.assert_allclose(split @ nodes, places_mm(), atol=1e-12)
-    assert split.min() >= 0
+    found, rng = pressure(), np.random.default_rng(6)
+    places = rng.choice(len(found.corners), 50, replace=False)
+    force = rng.normal(size=50)
+    split = found.on_nodes(places, force)
+    assert split.sum() == pytest.approx(force.sum())
+    np.testing.assert_allclose(split @ nodes, force @ places_mm()[places], atol=1e-12)
+    np.testing.assert_allclose(
+        found.between(places, nodes[:, 0]), places_mm()[places, 0], atol=1e-12
+    )
+
+
+def test_pressure_between_inner_nodes_follows_from_these() -> None:
+    """A traction that is linear inside and free at the rim is one of the unknown forces."""
+    found, points = pressure(), np.asarray(sensor_bundle().mesh.surface_mm)[:, :2]
+    nodes = np.flatnonzero(np.hypot(*points.T) < 2.4)
+    inner = np.zeros(len(points), dtype=bool)
+    inner[nodes] = True
+    parts = found.parts(nodes, inner)
+    at = places_mm()[parts.places]
+    linear = -1 + 0.1 * at[:, 0] - 0.2 * at[:, 1]
+    unknown = np.concatenate([linear[parts.own], np.zeros(2 * len(nodes))])
+    np.testing.assert_allclose(parts.normal(unknown), linear, atol=1e-12)
+    alone = found.parts(nodes, np.zeros(len(points), dtype=bool))
+    assert len(alone.own) == len(alone.places) == len(parts.places)
+    assert len(nodes) < len(parts.own) < 0.7 * len(parts.places)
 
 
 def test_stencils_are_local_and_images_of_each_other() -> None:
@@ -68,8 +89,8 @@ def test_hertz_pressure_moves_the_surface_as_the_closed_form_says() -> None:
     found, lattice = pressure(), pressure().surface.lattice
     force = nodal_forces(lattice)[:, 2]
     places = np.flatnonzero(force)
-    on_nodes = np.zeros((found.split.shape[1], 3))
-    on_nodes[:, 2] = found.split.T @ force
+    on_nodes = np.zeros((len(found.surface.place), 3))
+    on_nodes[:, 2] = found.on_nodes(places, force[places])
     nodes = np.flatnonzero(on_nodes[:, 2])
     compliance = SurfaceCompliance(sensor_bundle())
     moved = compliance.displacement(nodes, on_nodes[nodes])[:, 2]
@@ -98,18 +119,20 @@ def test_heights_by_force_are_those_of_each_force(seed: int) -> None:
     points = np.asarray(sensor_bundle().mesh.surface_mm)
     compliance = SurfaceCompliance(sensor_bundle())
     responses = Responses(compliance, marker_to_node(points, points[:3, :2]))
-    nodes = np.sort(rng.choice(len(points), 5, replace=False))
-    places = found.about(nodes)
-    normal, tangential = rng.normal(size=len(places)), rng.normal(size=(5, 2))
+    nodes = np.flatnonzero(np.hypot(*(points[:, :2] - rng.uniform(-2, 2, 2)).T) < 1.2)
+    inner = np.zeros(len(points), dtype=bool)
+    inner[nodes] = True
+    parts = found.parts(nodes, inner)
+    unknown, places = rng.normal(size=parts.size), parts.places
+    normal, tangential = parts.normal(unknown), unknown[parts.tangential].reshape(-1, 2)
     force = np.zeros_like(points)
     force[nodes, :2] = tangential
-    force[:, 2] = found.split[places].T @ normal
+    force[:, 2] = found.on_nodes(places, normal)
     bearing = np.flatnonzero(force.any(axis=1))
     moved = compliance.displacement(bearing, force[bearing])[:, 2]
     expected = found.heights(moved, (nodes, tangential), (places, normal))
     near = np.sort(rng.choice(len(expected), 60, replace=False))
-    by_force = found.by_force(responses, near, nodes, places)
-    given = by_force @ np.concatenate([normal, tangential.ravel()])
+    given = found.by_force(responses, near, parts) @ unknown
     np.testing.assert_allclose(given, expected[near], atol=3e-5 * np.abs(expected).max())
 
 

@@ -23,7 +23,8 @@ def test_the_covariance_is_that_of_estimates_from_random_data(expected: float) -
         estimate = (spread @ rows.T * weight) @ data
         step = np.linalg.lstsq(rows * np.sqrt(weight)[:, None], data * np.sqrt(weight))[0]
         markers = MarkerRows(np.arange(COUNT), rows, data - rows @ step, weight)
-        found += (spread @ sums.T - markers.overstated(spread)) / TRIALS
+        found += spread @ sums.T / TRIALS
+        found -= markers.overstated(markers.by_motion(spread), UNKNOWNS) / TRIALS
         estimates.append(estimate)
     # A scatter larger than expected is for the misfit of the markers, not for their weights.
     scatter = np.cov(np.array(estimates).T) * min(1.0, expected) ** 2
@@ -39,7 +40,7 @@ def test_the_response_is_the_change_of_the_sums_with_a_marker() -> None:
     sums = rng.normal(size=(6, UNKNOWNS))
     inverse = np.linalg.inv((rows.T * weight) @ rows)
     markers = MarkerRows(used, rows, np.zeros(2 * COUNT), weight)
-    found = markers.response(sums @ inverse, mm_per_px)
+    found = markers.response(markers.by_motion(sums @ inverse), mm_per_px)
     shift_px = rng.normal(size=(2 * COUNT, 2))
     moved = np.einsum("nij,nj->ni", mm_per_px, shift_px)[used].ravel()
     by_data = sums @ (inverse @ (rows.T @ (weight * moved)))

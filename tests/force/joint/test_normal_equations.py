@@ -73,8 +73,9 @@ def test_the_covariance_is_that_of_least_squares_without_free_nodes() -> None:
     inverse = np.linalg.inv(rows[:, kept].T @ rows[:, kept])[:-1, :-1]
     sums = np.random.default_rng(4).normal(size=(6, 3 * NODES))
     expected = sums[:, kept[:-1]] @ inverse @ sums[:, kept[:-1]].T
-    np.testing.assert_allclose(equations.covariance_of(sums, force), expected, rtol=1e-9)
-    assert not equations.covariance_of(sums, np.zeros(3 * NODES)).any()
+    free = np.repeat(force[2::3] < 0, 3)
+    np.testing.assert_allclose(equations.spread_of(sums, free) @ sums.T, expected, rtol=1e-9)
+    assert not equations.spread_of(sums, np.zeros(3 * NODES, dtype=bool)).any()
 
 
 def test_forces_are_the_least_in_the_cone() -> None:
