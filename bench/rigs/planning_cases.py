@@ -20,7 +20,7 @@ from random_contact_scenes import random_contact
 from bench.rigs.twin_rig import mechanics_key
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.plan import Plan, summed_error
 from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.probing import SHADING
 from gelslim_twin.planning.question import bundle_figures, question
@@ -153,9 +153,9 @@ def optional(plan: Plan) -> tuple[str, ...]:
 
 
 def _promised(plan: Plan, observable: str) -> float:
-    """Sum of the errors of all effects but compression, which neither plan includes."""
+    """The combined error of all effects but compression, which neither plan includes."""
     counted = [c for c in plan.choices if c.shares and c.effect != "compression"]
-    return sum(c.error.of(observable) for c in counted)
+    return summed_error(counted, observable)
 
 
 def _observed(plan: Plan, observe: tuple[str, ...]) -> Plan:

@@ -8,7 +8,7 @@ from functools import reduce
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from gelslim_twin.effects.effect import Bound, unit_of
+from gelslim_twin.effects.effect import Bound, combined, unit_of
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Choice, Plan
 from gelslim_twin.planning.planner import application_order
@@ -91,7 +91,10 @@ def missed(
     found: dict[str, dict[str, Any]] = {}
     for observable, by_scene in errors.items():
         allowed = plan.force_n if unit_of(observable) == "n" else plan.image_px
-        sums = [sum(values.values()) for values in by_scene]
+        sums = [
+            combined((error, plan.choice(name).is_scattered) for name, error in values.items())
+            for values in by_scene
+        ]
         if not sums or max(sums) <= allowed * (1 + 1e-12):
             continue
         worst = by_scene[sums.index(max(sums))]

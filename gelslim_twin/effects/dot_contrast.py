@@ -74,6 +74,7 @@ DEFOCUS = Effect(
     implementation="gelslim_twin.render.defocus",
     refines=("image",),
     after=("shading", "dirt"),
+    is_scattered=True,
 )
 
 
@@ -118,6 +119,7 @@ EXPOSURE = Effect(
     implementation="gelslim_twin.render.image_sensor",
     refines=("image",),
     after=("shading", "dirt", "defocus", "specular", "motion_blur"),
+    is_scattered=True,
 )
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import astuple, dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from operator import add
 from typing import Any
 
 from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
@@ -35,25 +36,48 @@ class Bound:
         """The error of one observable, in its unit. Raises KeyError."""
         return float(getattr(self, _FIELDS[observable]))
 
+    @classmethod
+    def by_observable(cls, errors: Mapping[str, float]) -> Bound:
+        """The errors by observable; those that are not given are zero."""
+        return cls(**{_FIELDS[o]: error for o, error in errors.items()})
+
+    @property
+    def _values(self) -> tuple[float, float, float, float]:
+        return self.force_n, self.displacement_px, self.markers_px, self.image_px
+
     def at_most(self, other: Bound) -> Bound:
         """The smaller error of each observable."""
-        return Bound(*map(min, astuple(self), astuple(other)))
+        return Bound(*map(min, self._values, other._values))
 
     def at_least(self, other: Bound) -> Bound:
         """The larger error of each observable."""
-        return Bound(*map(max, astuple(self), astuple(other)))
+        return Bound(*map(max, self._values, other._values))
 
     def plus(self, other: Bound) -> Bound:
         """The sum of the errors of each observable."""
-        return Bound(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+        return Bound(*map(add, self._values, other._values))
 
     def times(self, factor: float) -> Bound:
         """Every error times a factor."""
-        return Bound(*(factor * value for value in astuple(self)))
+        return Bound(*(factor * value for value in self._values))
 
     def to_record(self) -> dict[str, float]:
         """Errors by observable and unit."""
         return {f"{o}_{unit_of(o)}": self.of(o) for o in OBSERVABLES}
+
+
+def combined(errors: Iterable[tuple[float, bool]]) -> float:
+    """The error of several effects in one observable, from pairs (error, is_scattered).
+
+    Errors that move the gel or its image may all point the same way at the same dot, and add up;
+    so do those of scattered effects. The largest of the one sum lies at the rim of the contact,
+    that of the other at any dot and in any direction, so that the two sums add as independent
+    errors do: the root of the sum of their squares.
+    """
+    sums = [0.0, 0.0]
+    for error, is_scattered in errors:
+        sums[is_scattered] += error
+    return math.hypot(*sums) if all(sums) else sum(sums)
 
 
 def unit_of(observable: str) -> str:
@@ -119,6 +143,8 @@ class Effect:
         after: Effects that refine the same data before it.
         does_nothing: Whether its parameters make it do nothing, where a bound of zero does not
             tell.
+        is_scattered: Whether it shifts single dots in directions that do not depend on how the gel
+            moves, as a change of grey values does; `combined` says how such errors add up.
     """
 
     name: str
@@ -133,6 +159,7 @@ class Effect:
     refines: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
     does_nothing: Callable[[Circumstances], bool] | None = None
+    is_scattered: bool = False
 
     def size(self, c: Circumstances) -> Bound:
         """Error of leaving it out: its bound, or what a probe found where that is less."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from gelslim_twin.effects.effect import Bound, unit_of
+from gelslim_twin.effects.effect import Bound, combined, unit_of
 
 FORMAT = "gelslim-plan/2"
 TITLES = ("effect", "", "if left out", "found by", "rung", "ms", "why")
@@ -38,6 +39,8 @@ class Choice:
     """Module to import; empty where left out."""
     saved_ms: float = 0.0
     """Per pose, what it would take by its cheapest sufficient rung, where it is left out."""
+    is_scattered: bool = False
+    """Whether its error adds to that of others as `combined` says of scattered ones."""
 
     @property
     def spent_ms(self) -> float:
@@ -95,6 +98,11 @@ class Choice:
         }
 
 
+def summed_error(choices: Iterable[Choice], observable: str) -> float:
+    """The errors of those choices on which something observed depends, combined, in N or px."""
+    return combined((c.error.of(observable), c.is_scattered) for c in choices if c.shares)
+
+
 @dataclass(frozen=True)
 class Plan:
     """The choice for every effect, and the order in which those included are applied.
@@ -138,12 +146,12 @@ class Plan:
         return sum(choice.predicted_ms for choice in self.included)
 
     def error(self, observable: str) -> float:
-        """Sum of the errors of all effects in one observable, in N or px."""
-        return sum(c.error.of(observable) for c in self.choices if dict(c.shares))
+        """The errors of all effects in one observable, combined, in N or px."""
+        return summed_error(self.choices, observable)
 
     @property
     def over_tolerance(self) -> tuple[tuple[str, float], ...]:
-        """Observables whose summed error exceeds the tolerance, with that error."""
+        """Observables whose combined error exceeds the tolerance, with that error."""
         allowed = {o: self.force_n if unit_of(o) == "n" else self.image_px for o in self.observe}
         # The shares add up to the tolerance but for rounding.
         return tuple(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -77,9 +78,9 @@ def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
 
     For each observable the tolerance is shared evenly among the effects that can use it up. An
     effect left out contributes its bound, a simulated one the error of its rung, and neither may
-    exceed a share, so that the sum keeps the tolerance. What is left of the tolerance then goes to
-    the effects that save most time by it. Exceptions are effects that the scene switches off and
-    effects whose best rung errs more; `Plan.over_tolerance` lists them.
+    exceed a share, so that the errors combined (`effect.combined`) keep the tolerance. What is left
+    of the tolerance then goes to the effects that save most time by it. Exceptions are effects that
+    the scene switches off and effects whose best rung errs more; `Plan.over_tolerance` lists them.
 
     Effects that a probe left out together are left out where that keeps the tolerance and takes no
     longer than deciding about each of them.
@@ -154,17 +155,36 @@ def _provider(question: Question, effects: Sequence[Effect], datum: str) -> Effe
 
 
 def _shares(question: Question, relevant: Sequence[Effect]) -> dict[str, float]:
-    """Per observable, the tolerance over the number of effects that can use up some of it.
+    """Per observable, the equal share of each of the effects that can use up some tolerance.
 
     What effects that are left out together cost is taken off before.
     """
     lost = [question.weighed(e)[0] for e in relevant if e.name in question.left_out]
     others = [e for e in relevant if e.name not in question.left_out]
-    return {
-        o: max(0.0, question.tolerance(o) - sum(size.of(o) for size in lost))
-        / max(1, sum(_may_cost(question, e, o) for e in others))
-        for o in question.observe
-    }
+    found = {}
+    for o in question.observe:
+        able = [e.is_scattered for e in others if _may_cost(question, e, o)]
+        gone = sum(size.of(o) for size in lost)
+        found[o] = _equal_share(question.tolerance(o), gone, len(able) - sum(able), sum(able))
+    return found
+
+
+def _equal_share(tolerance: float, gone: float, steady: int, scattered: int) -> float:
+    """The share s of each effect where as many shares use up the tolerance.
+
+    `gone` is what scattered effects use up already: (steady s)² + (gone + scattered s)² is the
+    square of the tolerance (`combined`).
+    """
+    if gone >= tolerance:
+        return 0.0
+    if not gone and not (steady and scattered):
+        return tolerance / max(1, steady + scattered)
+    if not steady:
+        return (tolerance - gone) / max(1, scattered)
+    square = steady**2 + scattered**2
+    left = (tolerance - gone) * (tolerance + gone)
+    root = math.sqrt((scattered * gone) ** 2 + square * left)
+    return (root - scattered * gone) / square
 
 
 def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
@@ -211,13 +231,14 @@ def _with_leftover_spent(
     decided: dict[str, Choice],
 ) -> dict[str, Choice]:
     """The decisions with what is left of the tolerance spent on savings of time."""
-    cheaper, allowed = {}, {o: question.tolerance(o) for o in question.observe}
+    cheaper, counted = {}, dict(decided)
+    allowed = {o: question.tolerance(o) for o in question.observe}
     for effect in relevant:
         choice, use = decided[effect.name], question.use(effect)
         if use == "off":
             # What a scene switches off may err by more than all others together.
-            for o in allowed:
-                allowed[o] += max(0.0, choice.error.of(o) - shares[o])
+            within = choice.error.at_most(Bound.by_observable(shares))
+            counted[effect.name] = replace(choice, error=within)
         if not choice.included:
             continue
         _, ladder = question.weighed(effect)
@@ -225,7 +246,8 @@ def _with_leftover_spent(
         if use == "auto" and not effect.provides:
             others.append(_choice(question, effect, "within what others leave", shares))
         cheaper[effect.name] = others
-    return with_leftover_spent(decided, cheaper, allowed)
+    found = with_leftover_spent(counted, cheaper, allowed)
+    return {name: found[name] if name in cheaper else choice for name, choice in decided.items()}
 
 
 def _excess(error: float, share: float) -> float:
@@ -250,6 +272,7 @@ def _choice(
         size,
         probed=effect.was_probed(question.circumstances),
         formula=effect.formula,
+        is_scattered=effect.is_scattered,
     )
     if ladder is None:
         saved_ms = _rung(every, shares).milliseconds if size != Bound() else 0.0

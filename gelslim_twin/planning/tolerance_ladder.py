@@ -14,7 +14,7 @@ from gelslim_core.budget.budget import Budget, BudgetError, shown_share
 from gelslim_core.budget.ladder import Choice, Ladder, Rung, Wording
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import unit_of
-from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.plan import Plan, summed_error
 from gelslim_twin.planning.planner import Question, make_plan
 
 LEVELS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
@@ -97,7 +97,7 @@ def plan_error(question: Question, plan: Plan) -> float:
     whole = scale(question.circumstances)
     size = {"n": whole.force_n, "px": whole.image_px}
     counted = [c for c in plan.choices if dict(c.shares) and not _switched_off(question, c.effect)]
-    return max(sum(c.error.of(o) for c in counted) / size[unit_of(o)] for o in question.observe)
+    return max(summed_error(counted, o) / size[unit_of(o)] for o in question.observe)
 
 
 def plan_ms(plan: Plan, paces: Mapping[str, float]) -> float:
