@@ -147,6 +147,8 @@ class MotionFigures:
     """Largest change of depth between two poses, in contact."""
     step_aside_mm: float = 0.0
     """Largest way sideways of any point of the contact region between two poses, in contact."""
+    shortest_s: float = 0.0
+    """Shortest time between two poses, in contact; 0 where it is not known."""
     recedes: bool = False
     """Whether the tool rises from where it has pressed the gel."""
 

@@ -7,6 +7,7 @@ import math
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
+from gelslim_twin.effects.contact import moved_mm
 from gelslim_twin.effects.dot_contrast import (
     ExposureParameters,
     contrast,
@@ -99,6 +100,7 @@ SHADING = Effect(
     implementation="gelslim_twin.render.shading",
     needs=("displacement",),
     refines=("image",),
+    is_scattered=True,
 )
 
 
@@ -134,6 +136,7 @@ DIRT = Effect(
     implementation="gelslim_twin.render.blemishes",
     refines=("image",),
     after=("shading",),
+    is_scattered=True,
 )
 
 
@@ -169,6 +172,7 @@ SPECULAR = Effect(
     implementation="gelslim_twin.render.blemishes",
     refines=("image",),
     after=("shading", "dirt", "defocus"),
+    is_scattered=True,
 )
 
 
@@ -183,10 +187,25 @@ class MotionBlurParameters(EffectParameters):
     )
 
 
+JUMP_SAFETY = 2.0
+"""Factor on the displacement of the surface at the poses of a probe, for the poses between."""
+
+
 def smear_px(c: Circumstances) -> float:
-    """How far a dot moves while the shutter is open."""
-    dot_mm_s = math.inf if c.probed is None else c.probed.dot_mm_s
-    return min(c.motion.speed_mm_s, dot_mm_s) * _shutter_s(c) * c.sensor.px_per_mm
+    """How far a dot moves while the shutter is open, by the speed of the tool and of the dots.
+
+    A dot is displaced by no more than the surface at any pose, so that between two poses it moves
+    by at most twice that, also where a wall passes it; the shutter sees its share of that time.
+    """
+    open_s, steady_mm_s = _shutter_s(c), c.motion.speed_mm_s
+    most_mm = math.hypot(c.contact.depth_mm, c.contact.sideways_mm) + moved_mm(c)
+    if c.probed is not None:
+        steady_mm_s = min(steady_mm_s, c.probed.dot_mm_s)
+        most_mm = min(most_mm, JUMP_SAFETY * c.probed.moved_mm)
+    way_mm = steady_mm_s * open_s
+    if c.motion.shortest_s > 0:
+        way_mm = min(way_mm, 2 * most_mm * min(1.0, open_s / c.motion.shortest_s))
+    return way_mm * c.sensor.px_per_mm
 
 
 def _shutter_s(c: Circumstances) -> float:
@@ -194,8 +213,8 @@ def _shutter_s(c: Circumstances) -> float:
 
 
 def motion_blur_bound(c: Circumstances) -> Bound:
-    """Half the smear at the tool's speed: how far the middle of the smeared dot lags behind."""
-    return picture(c.motion.speed_mm_s * _shutter_s(c) * c.sensor.px_per_mm / 2)
+    """Half the smear: how far the middle of the smeared dot lags behind."""
+    return picture(smear_px(c) / 2)
 
 
 def motion_blur_ladder(c: Circumstances) -> tuple[Rung, ...]:
@@ -223,7 +242,7 @@ MOTION_BLUR = Effect(
     description="Blur of dots that move while the shutter is open",
     parameters=MotionBlurParameters,
     bound=motion_blur_bound,
-    formula="v t f/(2 Z)",
+    formula="v t f/(2 Z), at most the surface's displacement x t/time of a step x f/Z",
     ladder=motion_blur_ladder,
     implementation="gelslim_twin.render.image_sensor",
     refines=("image",),
@@ -276,6 +295,7 @@ SENSOR_NOISE = Effect(
     implementation="gelslim_twin.render.image_sensor",
     refines=("image",),
     after=("shading", "dirt", "defocus", "specular", "motion_blur", "exposure"),
+    is_scattered=True,
 )
 
 
@@ -315,4 +335,5 @@ COMPRESSION = Effect(
     implementation="gelslim_twin.render.image_sensor",
     refines=("image",),
     after=("shading", "dirt", "defocus", "specular", "motion_blur", "exposure", "sensor_noise"),
+    is_scattered=True,
 )

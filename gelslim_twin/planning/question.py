@@ -93,6 +93,7 @@ def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures
         return MotionFigures(len(poses))
     reach = footprint.reach_mm(max(depths))
     lateral = turned = speed = step = step_aside = 0.0
+    shortest = math.inf
     for (i, a), (j, b) in pairwise(enumerate(poses)):
         if depths[i] <= 0 and depths[j] <= 0:
             continue
@@ -105,6 +106,7 @@ def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures
         way = math.hypot(aside, b.depth_mm - a.depth_mm) + pushed
         speed = max(speed, way / (b.time_s - a.time_s))
         step, step_aside = max(step, abs(depths[j] - depths[i])), max(step_aside, aside)
+        shortest = min(shortest, b.time_s - a.time_s)
     return MotionFigures(
         poses=len(poses),
         depth_mm=max(depths),
@@ -115,6 +117,7 @@ def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures
         speed_mm_s=speed,
         step_mm=step,
         step_aside_mm=step_aside,
+        shortest_s=shortest if math.isfinite(shortest) else 0.0,
         recedes=any(b < a and a > 0 for a, b in pairwise(depths)),
     )
 
