@@ -40,11 +40,11 @@ LEAST_PICTURES = 2
 MOST_SHARE = 0.05
 """Largest time of a probe over that of the run with large strain solved to convergence, both as
 declared."""
-PAYING_SHARE = 0.1
+PAYING_SHARE = 0.25
 """Time of the pictures of a probe over what they may save, up to which any run has them drawn."""
 USUAL_STRAIN = 0.5
 """Share of the declared time of large strain that counts for the pictures of a probe: small
-contacts converge faster."""
+contacts converge faster, unless walls slide."""
 MOST_POSES, STRAIGHT_POSES = 12, 4
 """Poses of the path that a probe solves on a linear gel, and those of a straight press, of which
 the deepest is the hardest."""
@@ -103,8 +103,12 @@ def most_pictures(question: Question, plan: Plan, solved: Sequence[str]) -> int:
         return 0
     names = effects_to_draw(question, plan)
     saved_ms = plan.poses * sum(c.predicted_ms for c in plan.included if c.effect in names)
-    left_ms = MOST_SHARE * _run_ms(question, plan, USUAL_STRAIN) - probe_ms(question, plan, solved)
-    most_ms = min(max(left_ms, PAYING_SHARE * saved_ms), saved_ms)
+    spent_ms = probe_ms(question, plan, solved)
+    strained = 1.0 if question.circumstances.has_sliding_walls else USUAL_STRAIN
+    left_ms = MOST_SHARE * _run_ms(question, plan, strained) - spent_ms
+    # Where nothing else is probed, poses are solved for the pictures alone.
+    paying_ms = PAYING_SHARE * saved_ms - (0.0 if solved else spent_ms)
+    most_ms = min(max(left_ms, paying_ms), saved_ms)
     return max(0, math.floor(most_ms / picture_ms(question, plan)))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,11 +18,13 @@ from gelslim_twin.effects.circumstances import PictureSizes
 from gelslim_twin.effects.contact import convergence_ms
 from gelslim_twin.effects.dot_contrast import shift_px
 from gelslim_twin.effects.effect import OBSERVABLES, rounded_up
+from gelslim_twin.effects.grey_values import MotionBlurParameters, smear_px
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.probing import (
     MOST_SHARE,
     MOTION_BLUR,
+    PAYING_SHARE,
     PICTURED,
     SHADING,
     effects_to_probe,
@@ -41,6 +44,14 @@ def long_trial(seed: int, folder: Path) -> Trial:
     for move in values["motion"]["waypoints"]:
         move["steps"] *= 4
     return Trial.of(finger, values, folder)
+
+
+def without_compression(one: Trial) -> Trial:
+    """The scene with pictures as they are before rounding."""
+    c = one.asked.circumstances
+    off = c.parameters["compression"].model_copy(update={"use": "off"})
+    here = replace(c, parameters={**c.parameters, "compression": off})
+    return replace(one, asked=replace(one.asked, circumstances=here))
 
 
 def without(plan: Plan, *effects: str) -> Plan:
@@ -97,7 +108,10 @@ def test_sizes_of_grey_values_hold_at_other_poses(one: Trial) -> None:
 def test_effects_are_left_out_together_and_fewer_where_that_is_too_much(
     one: Trial,
 ) -> None:
-    """The light, a picture with all, one of fine shading (counts twice), one without."""
+    """The light by fine shading (counts twice), a picture with all, one without.
+
+    There is dirt in the picture, so that the coarsest lattice of shading is not judged.
+    """
     run = at_small_strain(one)
     hardest = max(run.states, key=lambda s: float(np.linalg.norm(s.force_n.sum(axis=0))))
     effects = tuple(name for name in PICTURED if name in run.plan.order)
@@ -115,19 +129,20 @@ def test_effects_are_left_out_together_and_fewer_where_that_is_too_much(
         return probe.together(hardest, effects, most, leaves_out)
 
     every = drawn(9, 1000.0)
-    assert (set(every.together), every.pictures) == (set(effects), 5)
+    assert (set(every.together), every.pictures) == (set(effects), 4)
     whole_px = sum(bound.image_px for bound in every.together.values())
     still = without(run.plan, "motion_blur")
     bare = one.carried_out(without(still, *effects), (hardest,))
     seen = one.carried_out(still, (hardest,))
     # The detector's own differences, and the light, found by the tests' own measure.
     light_px = one.light_apart_px(seen, one.carried_out(without(still, SHADING), (hardest,)))
-    assert whole_px >= max(2.9 * seen_apart_px(seen, bare, {0}), 1.5 * light_px)
+    assert whole_px >= max(1.6 * seen_apart_px(seen, bare, {0}), 1.5 * light_px)
     # Less is left out where all is too much, and nothing more is drawn than is allowed.
     fewer = drawn(9, 0.6 * whole_px)
     assert set(fewer.together) < set(effects)
     assert sum(bound.image_px for bound in fewer.together.values()) <= 0.6 * whole_px
-    assert 5 < fewer.pictures <= 9
+    assert 4 < fewer.pictures <= 9
+    assert not every.coarsest
     none = drawn(1, 1000.0)
     assert not none.together
     assert none.pictures <= 1
@@ -142,6 +157,24 @@ def test_sizes_of_grey_values_hold_in_random_scenes(tmp_path: Path, seed: int) -
         check_sizes(one, 7)
     except ContactError as error:
         pytest.skip(f"nothing to compare: {error}")
+
+
+@pytest.mark.slow
+def test_the_lattice_of_shading_is_not_judged_beside_dirt(tmp_path: Path) -> None:
+    """In 2071 the detector finds a dot beside dirt half a pixel away, at one of nine poses.
+
+    The light decides where: at the pose that is drawn the coarsest lattice shifted no dot.
+    """
+    one = without_compression(long_trial(2071, tmp_path))
+    one = replace(one, asked=replace(one.asked, image_px=0.0308))
+    plan = one.probed()
+    assert {"dirt", SHADING} <= {*plan.order}
+    whole = without(one.full(), "compression")
+    small = without(whole, "nonlinearity")
+    states = one.carried_out(small).states
+    run = one.carried_out(small, states)
+    drawn = one.carried_out(without(plan, "nonlinearity"), states)
+    assert one.differences(run, drawn, ("image",))["image"] <= 0.0308
 
 
 RELAXED = (3001, 3003, 3005, 3010, 3019, 3033, 3034, 3050, 3056, 3064)
@@ -166,8 +199,15 @@ def test_the_force_that_relaxes_and_the_speed_of_dots_hold_on_the_path(
     )
     assert 0 < lost <= found.sizes["relaxation"].force_n
     if asked.circumstances.has_sliding_walls:
-        # A dot jumps where a wall passes it, so that motion blur keeps its bound.
+        # A dot jumps where a wall passes it, so that its speed is not that at few poses.
         assert MOTION_BLUR not in effects_to_probe(asked, make_plan(asked))
+        known = replace(found, dot_mm_s=math.inf)
+        here = replace(asked.circumstances, probed=known)
+        open_s = here.given(MOTION_BLUR, MotionBlurParameters).shutter_ms / 1000
+        for k in range(1, len(on.states)):
+            share = min(1.0, open_s / on.step_s(k))
+            moved = np.linalg.norm(on.dots_px(k) - on.dots_px(k - 1), axis=1).max()
+            assert share * moved <= smear_px(here)
         return
     scale = asked.circumstances.sensor.px_per_mm
     for k in range(1, len(on.states)):
@@ -188,7 +228,9 @@ def test_a_probe_draws_within_its_share_of_the_run() -> None:
         ms = {c.effect: c.predicted_ms for c in plan.included}
         if "nonlinearity" in ms:
             ms["nonlinearity"] = convergence_ms(asked.circumstances)
-        assert probe_ms(asked, plan, effects) <= MOST_SHARE * sum(ms.values()) * plan.poses
+        saved_ms = sum(ms[name] for name in effects if name in PICTURED) * plan.poses
+        most_ms = max(MOST_SHARE * sum(ms.values()) * plan.poses, PAYING_SHARE * saved_ms)
+        assert probe_ms(asked, plan, effects) <= most_ms
     assert drawn
 
 
