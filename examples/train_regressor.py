@@ -5,11 +5,13 @@
 # fingers of one design do. A small network learns where a ball touches and how hard it pushes. It is judged
 # on other sensors.
 #
-# The libraries are in the extras `record` and `vision`, and scikit-learn. The numbers of samples are arguments:
-# `python train_regressor.py 2000 300 out/touches`.
+# The libraries are in the extras `record` and `vision`, and scikit-learn. The numbers of samples and the folder are
+# arguments: `python train_regressor.py 1600 300 .` trains on the data sets `out/touches` and `out/other_sensors`
+# of this folder, and makes what they lack.
 
 # %%
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -68,7 +70,7 @@ for name, sensors, seed, count in (
 ):
     scene = folder / f"{name}.yaml"
     scene.write_text(SCENE.format(name=name, sensors=sensors, seed=seed), encoding="utf-8")
-    gelslim.data_set(scene, folder / name, count=count)
+    gelslim.data_set(scene, folder / "out" / name, count=count)
 
 # %% [markdown]
 # The network sees a picture as cells of 16 x 12 px: how much brighter or darker each is than in the picture of the
@@ -87,7 +89,9 @@ def read(data_set: Path) -> tuple[np.ndarray, np.ndarray]:
     rows = pq.read_table(data_set / "index.parquet").to_pylist()
     sensors = {row["sensor"] for row in rows}
     rest = {k: cells(data_set / "sensors" / f"sensor_{k:02d}.png") for k in sensors}
-    changes = [(cells(data_set / r["file"]) / rest[r["sensor"]] - 1).ravel() for r in rows]
+    with ThreadPoolExecutor() as pool:
+        seen = pool.map(cells, [data_set / row["file"] for row in rows])
+        changes = [(s / rest[r["sensor"]] - 1).ravel() for s, r in zip(seen, rows, strict=True)]
     truth = [(r["contact_x_mm"], r["contact_y_mm"], r["fz_n"]) for r in rows]
     return np.array(changes), np.array(truth)
 
@@ -100,11 +104,11 @@ def learned(changes: np.ndarray, truth: np.ndarray) -> tuple[BaggingRegressor, S
         MLPRegressor(hidden_layer_sizes=(128, 64), alpha=1.0, max_iter=1500, random_state=0),
     )
     scale = StandardScaler().fit(truth)
-    model = BaggingRegressor(network, n_estimators=5, bootstrap=False, random_state=0)
+    model = BaggingRegressor(network, 5, bootstrap=False, n_jobs=-1, random_state=0)
     return model.fit(changes, scale.transform(truth)), scale
 
 
-train, other = read(folder / "touches"), read(folder / "other_sensors")
+train, other = read(folder / "out" / "touches"), read(folder / "out" / "other_sensors")
 model, scale = learned(*train)
 found = scale.inverse_transform(model.predict(other[0]))
 

@@ -166,7 +166,8 @@ def data_set(
         frames: `last`, `all` or `every:K`.
         jobs: Number of processes.
         scheduler: Address of a Dask scheduler, in place of processes.
-        frames_per_shard: Frames that are written together, at most; 1024 by default.
+        frames_per_shard: Frames that are written together, at most; by default those of the data
+            set in the folder, or 256 for a new one.
         overwrite: Replace another data set in the folder.
         progress: Called as the work goes on.
 
@@ -178,25 +179,22 @@ def data_set(
             are asked for.
         BudgetError: No plan keeps the budget.
         DataSetError: The folder holds something else, or the format has no such pictures.
-        EngineError: A script with several jobs has no `if __name__ == "__main__":`.
+        EngineError: No cluster answers, or a script with several jobs has no
+            `if __name__ == "__main__":`.
     """
     from gelslim.data_sets import made_data_set, prepared_data_set
     from gelslim_core.jobs import Engine
+    from gelslim_twin.datasets.ready import load_libraries
 
-    Engine(jobs, scheduler).require_main()
+    engine = Engine(jobs, scheduler)
+    engine.require_main()
     loaded, _ = with_budget(scene_of(scene), budget)
     folder = Path("out") / loaded.scene.name if out is None else Path(out)
-    job = prepared_data_set(
-        loaded,
-        folder,
-        count=count,
-        file_format=file_format,
-        pictures=pictures,
-        quality=quality,
-        frames=frames,
-        frames_per_shard=frames_per_shard,
-        progress=progress,
-    )
+    with engine.warmed(load_libraries):
+        job = prepared_data_set(
+            loaded, folder, count=count, file_format=file_format, pictures=pictures,
+            quality=quality, frames=frames, frames_per_shard=frames_per_shard, progress=progress,
+        )  # fmt: skip
     return made_data_set(job, folder, count, (jobs, scheduler), overwrite, progress)
 
 

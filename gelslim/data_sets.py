@@ -36,6 +36,7 @@ def prepared_data_set(
     """
     from gelslim.scene_sensor import require_within_gel, scene_bundle
     from gelslim_twin.datasets.built_sensors import built_sensors, thickness_mm
+    from gelslim_twin.datasets.data_set import manifest
     from gelslim_twin.datasets.formats import pictures_of
     from gelslim_twin.datasets.job import FrameChoice
     from gelslim_twin.datasets.joint_plan import hardest
@@ -61,6 +62,8 @@ def prepared_data_set(
     store_sensor(TwinSensor(bundle), place)
     if progress:
         progress("plan", 0, 1)
+    if frames_per_shard is None:
+        frames_per_shard = manifest(out).get("frames_per_shard", FRAMES_PER_SHARD)
     return prepared(
         loaded,
         place,
@@ -68,7 +71,7 @@ def prepared_data_set(
         format_name=file_format,
         pictures=encoding,
         frames=kept,
-        frames_per_shard=FRAMES_PER_SHARD if frames_per_shard is None else frames_per_shard,
+        frames_per_shard=frames_per_shard,
     )
 
 

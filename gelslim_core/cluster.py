@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from gelslim_core.errors import GelslimError
@@ -48,6 +49,44 @@ def on_cluster(
         EngineError: No cluster answers, or it has no workers.
         MissingLibraryError: The extra `cluster` is not installed.
     """
+    with _client(address, connect_s) as (distributed, client):
+        done = distributed.as_completed()
+        running: dict[Any, int] = {}
+        waiting = iter(range(len(tasks)))
+        while True:
+            most = tasks_per_worker * max(1, sum(client.nthreads().values()))
+            for number in itertools.islice(waiting, max(0, most - len(running))):
+                future = client.submit(perform, tasks[number], pure=False, retries=MAX_CRASHES)
+                running[future] = number
+                done.add(future)
+            if not running:
+                return
+            future = next(done)
+            yield running.pop(future), future.result()
+
+
+@contextmanager
+def warmed(ready: Callable[[], object], address: str, connect_s: float) -> Iterator[None]:
+    """Let every worker of a cluster call a function while the block does something else.
+
+    Args:
+        ready: Function at the top level of a module. What it raises stays with the worker.
+        address: Of the scheduler.
+        connect_s: How long to wait for the scheduler.
+
+    Raises:
+        EngineError: No cluster answers, or it has no workers.
+        MissingLibraryError: The extra `cluster` is not installed.
+    """
+    with _client(address, connect_s) as (_, client):
+        called = [client.submit(ready, workers=[name], pure=False) for name in client.nthreads()]
+        yield
+        del called
+
+
+@contextmanager
+def _client(address: str, connect_s: float) -> Iterator[tuple[Any, Any]]:
+    """The library, and a client of a cluster that has workers."""
     distributed = load("distributed", "--scheduler")
     try:
         client = distributed.Client(address, timeout=connect_s, set_as_default=False)
@@ -62,16 +101,4 @@ def on_cluster(
                 f"--scheduler {address}: the cluster has no workers; start some with "
                 f"`dask worker {address}` where gelslim-cad is installed"
             )
-        done = distributed.as_completed()
-        running: dict[Any, int] = {}
-        waiting = iter(range(len(tasks)))
-        while True:
-            most = tasks_per_worker * max(1, sum(client.nthreads().values()))
-            for number in itertools.islice(waiting, max(0, most - len(running))):
-                future = client.submit(perform, tasks[number], pure=False, retries=MAX_CRASHES)
-                running[future] = number
-                done.add(future)
-            if not running:
-                return
-            future = next(done)
-            yield running.pop(future), future.result()
+        yield distributed, client

@@ -21,7 +21,7 @@ from multiprocessing.connection import wait
 from types import FrameType
 from typing import Any, Literal, TypeVar
 
-from gelslim_core.cluster import MAX_CRASHES, EngineError, on_cluster
+from gelslim_core.cluster import MAX_CRASHES, EngineError, on_cluster, warmed
 from gelslim_core.files.held_interrupt import (
     RETRY_S,
     interrupts_held,
@@ -73,6 +73,24 @@ class Engine:
                 yield number, perform(task)
         else:
             yield from _in_pools(perform, tasks, min(self.jobs, len(tasks)))
+
+    @contextlib.contextmanager
+    def warmed(self, ready: Callable[[], object]) -> Iterator[None]:
+        """Let the workers of a cluster get ready while the block finds out what they shall do.
+
+        Args:
+            ready: Function at the top level of a module, such as one that imports libraries.
+                Without a scheduler it is not called, because there are no workers yet.
+
+        Raises:
+            EngineError: No cluster answers; so this is known before the work of the block.
+            MissingLibraryError: There is a scheduler, but the extra `cluster` is not installed.
+        """
+        if not self.scheduler:
+            yield
+            return
+        with warmed(ready, self.scheduler, CONNECT_S):
+            yield
 
     def require_main(self) -> None:
         """Refuse to start processes from a script that a worker process is importing.

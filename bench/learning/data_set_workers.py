@@ -5,7 +5,8 @@
 
 The scene is designs/scenes/shear_sphere.yaml. The scheduler and the workers are processes of their
 own, as users start them. The machine must have nothing else to do. Workers are new for every run,
-and so is the data set; its sensor with its compliance is that of the run before. Writes nothing.
+and so is the data set; its sensor with its compliance is that of the run before. Writes
+data/data_set_workers.json into the folder of --docs, and nothing without it.
 """
 
 from __future__ import annotations
@@ -20,35 +21,43 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import psutil
-
-from bench.bench_data import DOCS
+from bench_data import DOCS, write_data
+from rigs.machine import machine
 
 SCENE = DOCS.parent / "designs" / "scenes" / "shear_sphere.yaml"
 FRAMES = 31
 START_S = 30
+GRACE_S = 5
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=int, default=80)
     parser.add_argument("--pairs", type=int, default=3)
-    parser.add_argument("--frames-per-shard", type=int, default=124)
+    parser.add_argument("--frames-per-shard", type=int, default=62)
+    parser.add_argument("--docs", type=Path, help="folder like docs to write to")
     asked = parser.parse_args()
     size = asked.samples, asked.frames_per_shard
-    ratios = []
+    runs, ratios = [], []
     with TemporaryDirectory() as place:
         made(Path(place), 2, (4, FRAMES))  # the compliance, and compiled kernels
         for pair in range(asked.pairs):
             order = (1, 2) if pair % 2 else (2, 1)
-            wall_s = {workers: made(Path(place), workers, size) for workers in order}
-            ratios.append(wall_s[1] / wall_s[2])
-    print(f"{asked.samples * FRAMES} frames: two workers are {median(ratios):.2f} times as fast")
+            pair_runs = {workers: made(Path(place), workers, size) for workers in order}
+            ratios.append(pair_runs[1]["wall_s"] / pair_runs[2]["wall_s"])
+            runs += pair_runs.values()
+    frames = asked.samples * FRAMES
+    print(f"{frames} frames: two workers are {median(ratios):.2f} times as fast")
+    if asked.docs:
+        found = {"frames": frames, "frames_per_shard": size[1], "ratio": median(ratios)}
+        write_data("data_set_workers", {**machine(), **found, "runs": runs}, asked.docs)
 
 
-def made(place: Path, workers: int, size: tuple[int, int]) -> float:
-    """Make a data set; returns the seconds that it took."""
+def made(place: Path, workers: int, size: tuple[int, int]) -> dict[str, Any]:
+    """Make a data set; returns its wall time and the processor time of command and workers."""
     samples, frames_per_shard = size
     out = place / f"out_{time.monotonic_ns()}"
     with cluster(place, workers) as (address, processes):
@@ -59,21 +68,21 @@ def made(place: Path, workers: int, size: tuple[int, int]) -> float:
         ]
         before = [spent_s(process) for process in processes]
         start = time.perf_counter()
-        child = psutil.Popen(command, stdout=subprocess.DEVNULL)
+        child = psutil.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         own_s = 0.0
         while child.poll() is None:
             own_s = max(own_s, spent_s(child))
             time.sleep(0.05)
         wall_s = time.perf_counter() - start
         if child.returncode:
-            raise SystemExit(f"gelslim dataset ended with {child.returncode}")
+            raise SystemExit(f"gelslim dataset failed: {child.stderr.read()}")
         used = [spent_s(p) - s for p, s in zip(processes, before, strict=True)]
     print(
         f"{workers} worker{'s' * (workers > 1)}: {wall_s:.1f} s; processor: command {own_s:.1f} s, "
         f"workers {' and '.join(f'{s:.1f}' for s in used)} s",
         flush=True,
     )
-    return wall_s
+    return {"workers": workers, "wall_s": wall_s, "command_s": own_s, "worker_s": used}
 
 
 def spent_s(process: psutil.Process) -> float:
@@ -106,10 +115,19 @@ def cluster(place: Path, workers: int) -> Iterator[tuple[str, list[psutil.Proces
             time.sleep(START_S / 6)
             yield address, processes
         finally:
+            # A worker that is told to end while its scheduler ends waits for it for ever.
             for process in [*processes, scheduler]:
-                process.terminate()
-            for process in [*processes, scheduler]:
-                process.wait()
+                ended(process)
+
+
+def ended(process: psutil.Popen) -> None:
+    """End a process, by force where it does not end by itself."""
+    process.terminate()
+    try:
+        process.wait(GRACE_S)
+    except psutil.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def said(log: Path) -> str:

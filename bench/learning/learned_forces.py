@@ -83,10 +83,11 @@ def _draw(names: dict[str, Any], folder: Path, target: Path) -> None:
 
     found, truth = names["found"], names["other"][1]
     deepest = int(np.argsort(truth[:, 2])[len(truth) // 10])
-    files = names["pq"].read_table(folder / "other_sensors" / "index.parquet").to_pylist()
+    others = folder / "out" / "other_sensors"
+    files = names["pq"].read_table(others / "index.parquet").to_pylist()
     figure = Figure(figsize=(11, 3.6), layout="constrained")
     picture, place, force = figure.subplots(1, 3, width_ratios=(1.3, 1, 1))
-    picture.imshow(Image.open(folder / "other_sensors" / files[deepest]["file"]))
+    picture.imshow(Image.open(others / files[deepest]["file"]))
     picture.set(title="a picture that it never saw", xticks=[], yticks=[])
     place.plot(*truth[:, :2].T, ".", color="0.6", label="true")
     for end, start in zip(found, truth, strict=True):

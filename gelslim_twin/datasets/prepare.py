@@ -23,7 +23,8 @@ from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, sensor_key, store
 if TYPE_CHECKING:
     from ifem_export.compliance.pad_compliance import PadCompliance
 
-FRAMES_PER_SHARD = 1024
+FRAMES_PER_SHARD = 256
+"""About 100 MB of pictures of 640 x 480 px, and enough shards to divide among many workers."""
 JUDGED = 32
 """Samples on which the plan is judged."""
 FIXED_STIFFNESS = ("skin", "adhesion")

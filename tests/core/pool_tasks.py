@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from pathlib import Path
 
 
 def square(value: int) -> int:
     return value * value
+
+
+ready = threading.Semaphore(0)
+"""Counts the calls of `get_ready` by workers that are threads of the test."""
+
+
+def get_ready() -> None:
+    ready.release()
 
 
 def dies_once(task: tuple[str, int]) -> int:

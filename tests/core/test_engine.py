@@ -51,6 +51,11 @@ def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("gelslim_core.jobs.CONNECT_S", 1)
     with pytest.raises(EngineError, match=r"tcp://127\.0\.0\.1:1"):
         list(Engine(scheduler="tcp://127.0.0.1:1").run(pool_tasks.square, [1]))
+    with (
+        pytest.raises(EngineError, match="no Dask scheduler"),
+        Engine(scheduler="tcp://127.0.0.1:1").warmed(pool_tasks.get_ready),
+    ):
+        pytest.fail("the block must not begin")
 
 
 def test_a_local_cluster_gives_the_same() -> None:
@@ -63,6 +68,19 @@ def test_a_local_cluster_gives_the_same() -> None:
         # More than are submitted at one time.
         many = dict(Engine(scheduler=cluster.scheduler_address).run(pool_tasks.square, range(23)))
     assert many == {k: k * k for k in range(23)}
+
+
+def test_every_worker_of_a_cluster_gets_ready_meanwhile() -> None:
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster,
+        Engine(scheduler=cluster.scheduler_address).warmed(pool_tasks.get_ready),
+    ):
+        assert all(pool_tasks.ready.acquire(timeout=60) for _ in range(2))
+    with Engine(2).warmed(pool_tasks.get_ready):
+        assert not pool_tasks.ready.acquire(blocking=False)
 
 
 def test_a_script_that_its_workers_would_run_again_is_refused(

@@ -48,6 +48,19 @@ def commands(page: Path) -> list[str]:
     return [line for line in found if line.startswith("gelslim ")]
 
 
+def training_scenes() -> dict[str, str]:
+    """The scene of the page on training, and the copy of other sensors that it describes."""
+    text = blocks(DOCS / "train.md", "yaml")[0]
+    other = text
+    for old, new in (
+        ("name: touches", "name: other_sensors"),
+        ("sensors: 4", "sensors: 3"), ("seed: 1", "seed: 2"),
+    ):  # fmt: skip
+        assert other.count(old) == 1, old
+        other = other.replace(old, new)
+    return {"touches": text, "other_sensors": other}
+
+
 def headings(page: Path) -> set[str]:
     """Fragments that links may name."""
     found = re.findall(r"^#+ (.*)$", _FENCE.sub("", text_of(page)), re.MULTILINE)

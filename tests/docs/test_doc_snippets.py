@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page_text import DOCS, PAGES, ROOT, blocks, named, text_of
+import yaml
+from page_text import DOCS, PAGES, ROOT, blocks, named, text_of, training_scenes
 
 sys.path.insert(0, str(ROOT / "tests" / "force"))
 sys.path.insert(0, str(ROOT / "tests" / "twin"))
@@ -47,7 +48,8 @@ def test_yaml_blocks_are_legal(page: Path, number: int, tmp_path: Path) -> None:
     file = tmp_path / "scenes" / "block.yaml"
     file.parent.mkdir()
     if "gelslim-scene/1" in text:
-        for place in (tmp_path / "gelslim2.yaml", tmp_path / "scenes" / "mine.yaml"):
+        for place in (tmp_path / "gelslim2.yaml", tmp_path / "scenes" / "mine.yaml",
+                      tmp_path / "scenes" / "finger.yaml"):  # fmt: skip
             place.write_text(SMALL, encoding="utf-8")
         file.write_text(text, encoding="utf-8")
         scene = read_scene(file)
@@ -59,6 +61,17 @@ def test_yaml_blocks_are_legal(page: Path, number: int, tmp_path: Path) -> None:
         # A part of a spec is completed by what every spec needs.
         file.write_text(text if "gelslim-spec/1" in text else SMALL + text, encoding="utf-8")
         assert read_spec(file).spec.name
+
+
+def test_the_script_trains_on_the_data_sets_of_its_page() -> None:
+    """What the page's commands have made is not made again."""
+    source = (ROOT / "examples" / "train_regressor.py").read_text("utf-8")
+    pattern = re.search(r'^SCENE = """\\\n(.*?)"""$', source, re.DOTALL | re.MULTILINE)
+    assert pattern is not None
+    for (name, text), sensors, seed in zip(training_scenes().items(), (4, 3), (1, 2), strict=True):
+        assert f'("{name}", {sensors}, {seed}, ' in source
+        written = pattern.group(1).format(name=name, sensors=sensors, seed=seed)
+        assert yaml.safe_load(written) == yaml.safe_load(text)
 
 
 @pytest.fixture(scope="module")

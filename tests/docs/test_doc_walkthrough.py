@@ -12,11 +12,12 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
-from page_text import DOCS, PAGES, ROOT, blocks, commands, named, text_of
+from page_text import DOCS, PAGES, ROOT, blocks, commands, named, text_of, training_scenes
 
 from gelslim_cad.spec.reader import read_spec
 
@@ -24,6 +25,8 @@ SHORT_VALIDATE = ROOT / "tests" / "robustness" / "short_validate.py"
 SMALLER = (
     ("gelslim validate", f"python {SHORT_VALIDATE} validate"),
     ("--count 1000 -j 8", "--count 2"),
+    ("--count 1600", "--count 2"),
+    ("--count 300", "--count 2"),
     ("--rays 1048576", "--rays 16384"),
     ("--count 100 -j 2", "--count 2"),
     ("gel.length_mm=16:50:1", "gel.length_mm=16:50:17"),
@@ -54,8 +57,11 @@ EDITED = (
     ),
 )
 """What the reader fills in before a line, and labels that there are."""
-ELSEWHERE = ("--scheduler", "--install-completion", "gelslim view")
-"""Needs a cluster, a shell of one's own, or goes on until it is interrupted."""
+ELSEWHERE = (
+    *("--scheduler", "--install-completion", "gelslim view"),
+    *(() if find_spec("av") else ("--pictures video",)),
+)
+"""Needs a cluster, a shell of one's own, PyAV, or goes on until it is interrupted."""
 PRESS = """\
 format: gelslim-scene/1
 name: frames
@@ -111,6 +117,8 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> Path:
     line = "gelslim calibrate out/gelslim2-bundle reference.png -o calibration.json"
     done(line, folder)
     _press_ball(folder)
+    for name, text in training_scenes().items():
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
     return folder
 
 

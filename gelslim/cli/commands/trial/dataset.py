@@ -45,8 +45,11 @@ def dataset(
     jobs: Jobs = 1,
     scheduler: Scheduler = "",
     frames_per_shard: Annotated[
-        int, typer.Option(min=1, help="Frames that are written together, at most.")
-    ] = 1024,
+        int | None,
+        typer.Option(
+            min=1, help="Frames that are written together, at most; 256 for a new data set."
+        ),
+    ] = None,
     error: SceneError = None,
     within: PoseTime = None,
     overwrite: Annotated[
