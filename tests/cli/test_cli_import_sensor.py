@@ -53,6 +53,21 @@ def test_a_picture_and_four_lengths_make_a_sensor(
     assert "missing" in capsys.readouterr().out
 
 
+def test_a_picture_that_is_not_there_is_named_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.yaml"
+    assert main(["import-sensor", "--new", str(file)]) == 0
+    capsys.readouterr()
+    assert main(["import-sensor", str(file)]) == 2
+    at = 1 + next(
+        k for k, line in enumerate(file.read_text().splitlines()) if "  reference:" in line
+    )
+    told = capsys.readouterr().err
+    assert f"{file}:{at} view.reference" in told
+    assert "reference.png" in told
+
+
 def test_files_of_others_are_kept(picture: Path) -> None:
     out = picture.parent / "mine"
     out.mkdir()

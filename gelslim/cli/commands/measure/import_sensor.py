@@ -128,7 +128,9 @@ def _description(source: Path, given: dict[str, Any]) -> tuple[Loaded[SensorDesc
     if source.suffix.lower() in (".yaml", ".yml"):
         if given:
             raise CommandError(f"{source} says all of the sensor: leave the other options out")
-        return read_description(source), source.parent
+        loaded = read_description(source)
+        _require_reference(loaded, source)
+        return loaded, source.parent
     need = {
         "gel.length_mm": "--length", "gel.width_mm": "--width", "gel.thickness_mm": "--thickness",
         "markers.pitch_mm": "--pitch",
@@ -146,6 +148,24 @@ def _description(source: Path, given: dict[str, Any]) -> tuple[Loaded[SensorDesc
         blocks.setdefault(block, {})[field] = value
     blocks.setdefault("view", {})["reference"] = str(source)
     return load_bytes("options", json.dumps(blocks).encode(), SensorDescription), Path()
+
+
+def _require_reference(loaded: Loaded[SensorDescription], source: Path) -> None:
+    """Raise InputError where the picture that a description names is not there."""
+    from gelslim_core.yaml.errors import InputError, Problem
+
+    field, name = "view.reference", loaded.model.view.reference
+    if not (source.parent / name).exists():
+        at = loaded.source_map[field]
+        raise InputError(
+            (
+                Problem(
+                    loaded.path, at.line, at.column, field, name,
+                    "there is no such file beside the description",
+                    "name a picture without contact, or a folder of several",
+                ),
+            )
+        )  # fmt: skip
 
 
 def _name(picture: Path) -> str:
