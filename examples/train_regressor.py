@@ -137,5 +137,6 @@ for text, e in (("network", network), ("mean", constant)):
         f"normal force {e['force_n']:.3f} N (95 %: {e['force_95_n']:.3f} N), "
         f"{e['force_share']:.0%} of it"
     )
-assert network["place_mm"] < constant["place_mm"] / 2
+enough = network["place_mm"] < constant["place_mm"] / 2
+assert enough, f"{train_count} samples are too few to learn from: take 150 or more"
 assert network["force_n"] < constant["force_n"] / 2
