@@ -17,10 +17,19 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bench.bench_data import DOCS, ROOT, write_whole
-from bench.force import force_sigma
-from bench.learning import data_set_cost, learned_forces, real_locations
-from bench.page import (
+import data_set_cost
+import force_sigma
+import learned_forces
+import linear_gel
+import mitsuba_forces
+import real_locations
+import twin_batch
+import twin_fine
+import twin_look
+import twin_skin
+import twin_steps
+from bench_data import DOCS, write_whole
+from page import (
     drawn_light_table,
     force_tables,
     page_tables,
@@ -66,6 +75,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "ladders": _from("force_ladders", force_tables.ladder_tables),
         "large-strain": _from("force_ladders", page_tables.large_strain),
         "sigma": _from("force_sigma", force_sigma.table),
+        "mitsuba-forces": _from("mitsuba_forces", mitsuba_forces.table),
     },
     "docs/digital_twin.md": {
         "validation": _from("twin_validation", twin_tables.validation_text),

@@ -48,17 +48,24 @@ class Meshes:
 
     folder: Path
 
-    def of(self, name: str, faces: Faces, bsdf: dict[str, Any]) -> dict[str, Any]:
-        """A mesh with the normals of its triangles."""
+    def of(
+        self, name: str, faces: Faces, bsdf: dict[str, Any], texture: Array | None = None
+    ) -> dict[str, Any]:
+        """A mesh with the normals of its triangles, and texture coordinates (n, 2) of its corners.
+
+        The texture runs over the mesh as the corners say, whatever their place.
+        """
         path = self.folder / f"{name}.ply"
         corners, triangles = faces
-        vertices = np.zeros(len(corners), dtype=[(axis, "<f4") for axis in "xyz"])
-        for axis, column in zip("xyz", np.asarray(corners).T, strict=True):
+        names = "xyz" if texture is None else "xyzst"
+        columns = np.column_stack([corners, *([] if texture is None else [texture])]).T
+        vertices = np.zeros(len(corners), dtype=[(axis, "<f4") for axis in names])
+        for axis, column in zip(names, columns, strict=True):
             vertices[axis] = column
         rows = np.zeros(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
         rows["count"], rows["corners"] = 3, triangles
         head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
-        head += [f"property float {axis}" for axis in "xyz"]
+        head += [f"property float {axis}" for axis in names]
         head += [f"element face {len(rows)}", "property list uchar int vertex_indices"]
         text = "\n".join([*head, "end_header\n"]).encode()
         path.write_bytes(text + vertices.tobytes() + rows.tobytes())
@@ -176,7 +183,7 @@ def _lamps(scene: LightScene, meshes: Meshes) -> Iterator[tuple[str, Any]]:
         foot = scene.profile.edge(row.edge).curve
         (a, level), b = foot.start, foot.end[0]
         low, high = min(a, b), max(a, b)
-        middle, half = (low + high) / 2, row.size_mm / 2
+        middle, half = (low + high) / 2 + math.copysign(row.offset_mm, b - a), row.size_mm / 2
         light = {"type": "rgb", "value": COLOURS[row.colour]}
         for i, x in enumerate(row.x_mm):
             name = f"led_{row.colour}_{i}"

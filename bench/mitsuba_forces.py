@@ -1,0 +1,355 @@
+"""Forces of objects of unknown shape, from pictures by Mitsuba 3 and contacts of other elements.
+
+    DRJIT_LIBLLVM_PATH=/usr/lib/x86_64-linux-gnu/libLLVM-19.so python bench/mitsuba_forces.py
+    python bench/mitsuba_forces.py --figure     # table and figure from the data again
+
+Writes docs/data/mitsuba_forces.json and docs/images/mitsuba_forces.png. A finger `gelslim2` that is
+built a little beside its design is photographed at rest, under contacts of known force and under a
+ball for the calibration of its light. Then the commands run that a user would type: `gelslim
+bundle`, `calibrate`, `calibrate-light` and `force`, with nothing said of the object. Pictures are
+kept in a folder, so that a run that was stopped goes on where it ended. Light and pictures are told
+in rigs/mitsuba_sensor.py, contacts in rigs/outside_contacts.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import math
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_data import DOCS, write_data, write_whole
+from numpy.typing import NDArray
+from rigs.machine import installed, machine
+
+Array = NDArray[np.float64]
+Record = Mapping[str, Any]
+DESIGN = Path(__file__).parents[1] / "designs" / "gelslim2.yaml"
+KEPT = Path("out") / "mitsuba_forces"
+CONTACTS, PRESSES, RAYS = 16, 8, 8_000_000
+TRACED, CALIBRATED = ("light as traced", "light calibrated")
+"""What is told of the light beside the camera's calibration."""
+COLUMNS = ("fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm")
+COLOURS = {TRACED: "#c4580a", CALIBRATED: "#1f4e8c"}
+_NORMAL_95 = 1.96
+LABELS = ("F_x", "F_y", "F_z", "T_x", "T_y", "T_z")
+
+
+def main() -> None:
+    """Draw, run the commands, score; or only make table and figure."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--contacts", type=int, default=CONTACTS, help="half of them balls")
+    parser.add_argument("--rays", type=int, default=RAYS, help="of each colour that reach the gel")
+    parser.add_argument("--kept", type=Path, default=KEPT, help="folder for pictures and runs")
+    parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
+    parser.add_argument("--docs", type=Path, default=DOCS, help="folder like docs")
+    options = parser.parse_args()
+    stored = options.docs / "data" / "mitsuba_forces.json"
+    if not options.figure:
+        trial = Trial(options.kept, options.contacts, options.rays)
+        data = {**machine(0), "mitsuba": installed("mitsuba"), "rays": options.rays}
+        write_data("mitsuba_forces", {**data, **trial.scored()}, options.docs)
+    record = json.loads(stored.read_text("utf-8"))
+    write_whole(options.docs / "images" / "mitsuba_forces.png", drawn(record))
+    print(table(record))
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Pictures and runs in a folder.
+
+    Attributes:
+        kept: The folder.
+        contacts: Number of contacts; every other one is a ball.
+        rays: Rays of each source that reach the gel.
+        presses: Pictures of a ball for the calibration of the light; 0 to leave that out.
+    """
+
+    kept: Path
+    contacts: int
+    rays: int
+    presses: int = PRESSES
+
+    @cached_property
+    def bundle(self) -> Path:
+        """The sensor as designed, by `gelslim bundle`."""
+        folder = self.kept / "bundle"
+        if not folder.exists():
+            gelslim("bundle", str(DESIGN), "-o", str(folder), "--no-ladder")
+        return folder
+
+    @cached_property
+    def pads(self) -> Any:
+        """Contacts of known force."""
+        from rigs.outside_contacts import OutsidePads
+
+        from ifem_export.bundle.files import load_bundle
+
+        return OutsidePads(load_bundle(self.bundle))
+
+    @cached_property
+    def sensor(self) -> Any:
+        """The built finger."""
+        from rigs.mitsuba_sensor import MitsubaSensor
+
+        from gelslim_cad.dimensions import derive
+        from gelslim_cad.sensor import marker_grid
+        from gelslim_cad.spec.reader import read_spec
+
+        d = derive(read_spec(DESIGN).spec)
+        grid = marker_grid(d)
+        return MitsubaSensor.of_finger(
+            d, grid.positions_mm, grid.diameter_mm, self.rays, self.kept / "light"
+        )
+
+    def seen(self, name: str, motion: Any) -> Array:
+        """Light in the pixels, drawn once."""
+        path = self.kept / "light" / f"{name.replace(' ', '_')}.npy"
+        if not path.exists():
+            print(name, flush=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            light = self.sensor.seen(motion).astype(np.float32)
+            fresh = path.with_suffix(".new.npy")
+            np.save(fresh, light)
+            fresh.replace(path)
+        return np.load(path).astype(float)
+
+    def every_contact(self) -> Iterator[Any]:
+        """The contacts in their order."""
+        for number in range(self.contacts):
+            kind = self.pads.ball if number % 2 else self.pads.press
+            yield kind(number // 2)
+
+    def draw(self) -> list[Any]:
+        """Write the pictures: rest, presses of a ball, and frames with rest between contacts."""
+        for name in ("frames", "presses"):
+            shutil.rmtree(self.kept / name, ignore_errors=True)
+        rest = self.seen("rest", None)
+        camera = self.sensor.response(rest)
+        write_picture(self.kept / "rest.png", camera.picture(rest, 0))
+        contacts = list(self.every_contact())
+        for number, contact in enumerate(contacts):
+            light = self.seen(contact.name, contact.motion)
+            for k, shown in enumerate((rest, light)):
+                frame = 2 * number + k
+                picture = camera.picture(shown, 1000 + frame)
+                write_picture(self.kept / "frames" / f"{frame:03}.png", picture)
+        for number in range(self.presses):
+            press = self.pads.calibration_press(number)
+            light = self.seen(press.name, press.motion)
+            picture = camera.picture(light, 100 + number)
+            write_picture(self.kept / "presses" / f"{number:02}.png", picture)
+        return contacts
+
+    def scored(self) -> dict[str, Any]:
+        """Forces of every contact beside the truth, by what is told of the light."""
+        contacts = self.draw()
+        bundle, calibration = str(self.bundle), str(self.kept / "calibration.json")
+        gelslim("calibrate", bundle, str(self.kept / "rest.png"), "-o", calibration)
+        ways: dict[str, tuple[str, ...]] = {TRACED: ()}
+        if self.presses:
+            ways[CALIBRATED] = ("--light-calibration", str(self._calibrated_light(calibration)))
+        found = {}
+        for name, told in ways.items():
+            run = self.kept / name.replace(" ", "_")
+            gelslim(
+                "force", bundle, str(self.kept / "frames"), "-c", calibration, *told,
+                "-o", str(run), "--force", "--pictures", "0",
+            )  # fmt: skip
+            rows = read_rows(run / "wrenches.csv")
+            found[name] = {"at_rest": _at_rest(rows[0::2]), "rows": [_row(r) for r in rows[1::2]]}
+        truth = [
+            {"name": c.name, "wrench": _short(c.wrench), "centre_mm": _short(c.centre_mm)}
+            for c in contacts
+        ]
+        return {"truth": truth, "ways": found}
+
+    def _calibrated_light(self, calibration: str) -> Path:
+        """The light by presses of a ball."""
+        from rigs.outside_contacts import CALIBRATION_BALL_MM
+
+        path = self.kept / "light.json"
+        gelslim(
+            "calibrate-light", str(self.bundle), str(self.kept / "rest.png"),
+            str(self.kept / "presses"), "--ball-mm", str(CALIBRATION_BALL_MM),
+            "-c", calibration, "-o", str(path),
+        )  # fmt: skip
+        return path
+
+
+def gelslim(*words: str) -> None:
+    """Run a command of the program as a user would; its failure ends the bench."""
+    print("gelslim", *words, flush=True)
+    subprocess.run([sys.executable, "-m", "gelslim", *words], check=True)
+
+
+def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
+    """Write a picture as PNG."""
+    import cv2
+
+    done, data = cv2.imencode(".png", np.ascontiguousarray(picture[..., ::-1]))
+    assert done
+    write_whole(path, data.tobytes())
+
+
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """The lines of a file of wrenches."""
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _row(found: Mapping[str, str]) -> dict[str, Any]:
+    return {
+        "wrench": _short([float(found[name]) for name in COLUMNS]),
+        "sigma": _short([float(found[f"sigma_{name}"]) for name in COLUMNS]),
+        "centre_mm": _short([float(found["cop_x_mm"]), float(found["cop_y_mm"])]),
+        "problems": found["problems"],
+    }
+
+
+def _at_rest(rows: list[dict[str, str]]) -> dict[str, Any]:
+    """Largest component of the force of frames without contact, in N; unknown ones counted."""
+    forces = np.array([[float(row[name]) for name in COLUMNS[:3]] for row in rows])
+    return {
+        "largest_n": _short(np.nanmax(np.abs(forces), axis=0)),
+        "unknown": int(np.isnan(forces).any(axis=1).sum()),
+    }
+
+
+def _short(values: Any) -> list[float | None]:
+    return [float(f"{v:.5g}") if math.isfinite(v) else None for v in values]
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """Contacts found with one light, beside the truth; NaN where a component is unknown.
+
+    Attributes:
+        truth: (n, 6) force in N and torque in N mm.
+        found: (n, 6).
+        sigma: (n, 6).
+        centre_off_mm: (n,) distance of the centres of pressure.
+    """
+
+    truth: Array
+    found: Array
+    sigma: Array
+    centre_off_mm: Array
+
+    @classmethod
+    def of(cls, record: Record, way: str, kind: str = "") -> Scores:
+        """Those of the contacts whose name starts with `kind`."""
+        rows = record["ways"][way]["rows"]
+        pairs = [
+            (true, row)
+            for true, row in zip(record["truth"], rows, strict=True)
+            if true["name"].startswith(kind)
+        ]
+        found, sigma = (
+            np.array([row[key] for _, row in pairs], dtype=float) for key in ("wrench", "sigma")
+        )
+        truth = np.array([true["wrench"] for true, _ in pairs], dtype=float)
+        centres = [
+            np.array([v["centre_mm"] for v in part], dtype=float)
+            for part in zip(*pairs, strict=True)
+        ]
+        return cls(truth, found, sigma, np.hypot(*(centres[1] - centres[0]).T))
+
+    @property
+    def z(self) -> Array:
+        """(n, 6) error over the standard deviation."""
+        return (self.found - self.truth) / self.sigma
+
+    @property
+    def unknown(self) -> int:
+        """Contacts whose normal force is unknown."""
+        return int(np.isnan(self.found[:, 2]).sum())
+
+    @property
+    def normal_error(self) -> Array:
+        """Relative errors of the normal forces that are known."""
+        every = self.found[:, 2] / self.truth[:, 2] - 1
+        return np.asarray(every[np.isfinite(every)])
+
+    @property
+    def shear_error_n(self) -> Array:
+        """Lengths of the errors of the tangential force."""
+        return np.hypot(*(self.found - self.truth)[:, :2].T)
+
+
+def table(record: Record) -> str:
+    """Errors and scores as a Markdown table."""
+    kinds = {"given tractions": "press", "balls": "ball", "**all**": ""}
+    lines = [
+        f"The finger `gelslim2` with {record['rays'] / 1e6:.3g} million rays of each colour on its "
+        "gel; three numbers are those of F_x, F_y and F_z.",
+        "",
+        "| contacts | number | F_z unknown | median \\|error\\| of F_z | mean error of F_z | "
+        "median error of the shear, mN | centre of pressure off, mm | RMS of error/σ | "
+        "within 1.96 σ |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for way in record["ways"]:
+        for name, kind in kinds.items():
+            lines.append(_line(f"{way}, {name}", Scores.of(record, way, kind)))
+    return "\n".join(lines)
+
+
+def _line(name: str, some: Scores) -> str:
+    z = some.z[:, :3]
+    rms = [math.sqrt(np.nanmean(column**2)) for column in z.T]
+    held = [100 * float(np.nanmean(np.abs(c[np.isfinite(c)]) < _NORMAL_95)) for c in z.T]
+    error = some.normal_error
+    cells = [
+        name,
+        f"{len(some.truth)}",
+        f"{some.unknown}",
+        f"{100 * np.median(np.abs(error)):.1f} %",
+        f"{100 * error.mean():+.1f} %",
+        f"{1000 * np.nanmedian(some.shear_error_n):.2g}",
+        f"{np.nanmedian(some.centre_off_mm):.2f}",
+        ", ".join(f"{value:.2f}" for value in rms),
+        ", ".join(f"{value:.0f}" for value in held) + " %",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def drawn(record: Record) -> bytes:
+    """Found against true forces with their deviations, a panel for each direction, as PNG."""
+    import io
+
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure: Any = Figure(figsize=(11.0, 3.9), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, 3)
+    for k, axes in enumerate(panels):
+        for way, shift in zip(record["ways"], (-0.004, 0.004), strict=False):
+            some = Scores.of(record, way)
+            axes.errorbar(
+                some.truth[:, k] + shift, some.found[:, k], some.sigma[:, k],
+                fmt="o", ms=3.5, lw=0.9, color=COLOURS[way], label=way,
+            )  # fmt: skip
+        low, high = axes.get_xlim()
+        axes.plot([low, high], [low, high], color="#9aa3ad", lw=0.8, zorder=0)
+        axes.set(xlabel=f"true ${LABELS[k]}$, N", ylabel=f"found ${LABELS[k]}$, N")
+    panels[0].legend(fontsize=8, frameon=False)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return stream.getvalue()
+
+
+if __name__ == "__main__":
+    main()

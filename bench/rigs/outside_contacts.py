@@ -1,0 +1,211 @@
+"""Contacts of known force on pads that the force pipeline does not have, for outside renderers.
+
+The finger is `gelslim2`. Forces are given tractions on a pad of half the pitch and eight layers, or
+balls whose contact is solved by axisymmetric finite elements with shear by given tractions; both
+come from tests/force. Modulus, thickness and Poisson's ratio are drawn within the tolerances that
+the bundle states.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.ladder import refined
+from ifem_export.operators.surface_operator import SurfaceOperator, surface_operator
+
+TESTS = str(Path(__file__).parents[2] / "tests" / "force")
+if TESTS not in sys.path:
+    sys.path.insert(0, TESTS)
+
+from pressed_disc import PressedDisc, pressed_disc  # noqa: E402
+from pressed_samples import FRICTION, surface_splines, tractions  # noqa: E402
+
+Array = NDArray[np.float64]
+Motion = Callable[[Array], Array]
+GELS = ((-1, 1), (1, 1), (1, -1), (-1, -1))
+"""Thickness and Poisson's ratio of the built gels, in standard deviations."""
+CALIBRATION_BALL_MM = 8.0
+_RADII_MM, _LEAST_N = (4.0, 5.0, 6.35, 8.0), 0.2
+_SIZES, _PLACES_MM = (0.4, 1.3), 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class OutsideContact:
+    """A contact with what it does to the gel.
+
+    Attributes:
+        name: Kind and number.
+        motion: Places (n, 2) at rest to motions (n, 3) of the surface in mm.
+        wrench: (6,) force in N and torque about the origin in N mm, on the gel.
+        centre_mm: (2,) centre of pressure.
+    """
+
+    name: str
+    motion: Motion
+    wrench: Array
+    centre_mm: Array
+
+
+@dataclass(frozen=True, eq=False)
+class OutsidePads:
+    """The pads of the truth of a sensor."""
+
+    bundle: Bundle
+
+    def press(self, seed: int) -> OutsideContact:
+        """Random tractions: one or two patches that push, shear and twist."""
+        for attempt in range(100):
+            rng = np.random.default_rng([61, seed, attempt])
+            gel = self.gel(seed)
+            size = np.exp(rng.uniform(*np.log(_SIZES)))
+            points = gel.points_mm
+            force = tractions(points, rng) * gel.cell_mm2 * size
+            if -force[:, 2].sum() >= _LEAST_N:
+                return OutsideContact(
+                    f"press {seed}",
+                    gel.motion(force),
+                    _wrench(points, force),
+                    _centre(points, force),
+                )
+        raise AssertionError("no contact of sufficient force in a hundred draws")
+
+    def ball(self, seed: int) -> OutsideContact:
+        """A ball that pushes, sticking or not, and shears by friction."""
+        gel = self.gel(seed)
+        rng = np.random.default_rng([62, seed])
+        radius = float(rng.choice(_RADII_MM))
+        disc = pressed_disc(radius, gel.thickness_mm, gel.poissons_ratio, bool(rng.random() < 0.5))
+        least = np.interp(_LEAST_N / gel.young_mpa, disc.force_n, disc.contact_mm)
+        largest = min(2.8, float(np.sqrt(2 * radius * 0.3 * gel.thickness_mm)))
+        contact, place = rng.uniform(max(1.2, least), largest), rng.uniform(-6, 6, 2)
+        push = gel.young_mpa * float(np.interp(contact, disc.contact_mm, disc.force_n))
+        contact, outward, height = disc.at_force(push / gel.young_mpa)
+        points = gel.points_mm
+        inside = 1 - ((points[:, :2] - place) ** 2).sum(axis=1) / contact**2
+        share = np.sqrt(np.maximum(inside, 0))
+        share /= share.sum()
+        turn, friction = rng.uniform(0, 2 * np.pi), rng.uniform(0, FRICTION)
+        shear = friction * push * np.array([np.cos(turn), np.sin(turn)])
+        sheared = gel.motion(np.outer(share, [*shear, 0.0]))
+        round_motion = _round_motion(place, disc.r_mm, outward, height)
+
+        def motion(places_mm: Array) -> Array:
+            moved = round_motion(places_mm)
+            moved[:, :2] += sheared(places_mm)[:, :2]
+            return moved
+
+        force = np.array([*shear, -push])
+        wrench = np.concatenate([force, np.cross([*place, 0.0], force)])
+        return OutsideContact(f"ball {seed}", motion, wrench, place)
+
+    def calibration_press(self, number: int) -> OutsideContact:
+        """A ball of `CALIBRATION_BALL_MM` pressed straight down in a quarter of the gel.
+
+        The elements are linear: their surface has the shape of the ball by its places at rest, and
+        is drawn towards the middle by some percent. The ball that they have is therefore larger by
+        twice as much, so that the surface as it is seen has the size of the ball.
+        """
+        gel, rng = self.gel(0), np.random.default_rng([63, number])
+        contact = rng.uniform(1.2, 2.1)
+        radius = CALIBRATION_BALL_MM / 2
+        for _ in range(2):
+            disc = pressed_disc(round(radius, 3), gel.thickness_mm, gel.poissons_ratio)
+            stretch = 1 + _strain(disc, contact)
+            radius = CALIBRATION_BALL_MM / 2 / stretch**2
+        push = gel.young_mpa * float(np.interp(contact, disc.contact_mm, disc.force_n))
+        _, outward, height = disc.at_force(push / gel.young_mpa)
+        quarter = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])[number % 4]
+        place = quarter * rng.uniform(1.0, 8.0, 2)
+        wrench = np.array([0, 0, -push, -push * place[1], push * place[0], 0])
+        motion = _round_motion(place, disc.r_mm, outward, height)
+        return OutsideContact(f"calibration {number}", motion, wrench, place)
+
+    def gel(self, seed: int) -> BuiltGel:
+        """The gel of a contact; four thicknesses and ratios take turns, the modulus is drawn."""
+        tolerances = self.bundle.tolerances
+        sigma = tolerances["youngs_modulus_mpa"] / self.bundle.material.youngs_modulus_mpa
+        young = float(np.exp(sigma * np.random.default_rng([64, seed]).normal()))
+        return replace(_built_gel(self.bundle, seed % len(GELS)), young=young)
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltGel:
+    """A gel on a mesh of half the pitch; its modulus is `young` times the design's."""
+
+    mesh: PadMesh
+    operator: SurfaceOperator
+    designed_mpa: float
+    poissons_ratio: float
+    thickness_mm: float
+    young: float = 1.0
+
+    @property
+    def young_mpa(self) -> float:
+        """Young's modulus."""
+        return self.young * self.designed_mpa
+
+    @property
+    def points_mm(self) -> Array:
+        """(n, 3) surface nodes."""
+        return np.asarray(self.mesh.surface_mm)
+
+    @property
+    def cell_mm2(self) -> float:
+        """Area of a cell of the surface."""
+        return float(np.prod(self.mesh.cell_size_mm[:2]))
+
+    def motion(self, force_n: Array) -> Motion:
+        """Motion of the surface under forces (n, 3) on its nodes."""
+        moved = self.operator.displacement(force_n / self.young)
+        splines = surface_splines(self.points_mm, moved)
+        return lambda places: np.column_stack([s.ev(*places.T) for s in splines])
+
+
+@cache
+def _built_gel(bundle: Bundle, number: int) -> BuiltGel:
+    thicker, softer = GELS[number]
+    designed = bundle.mesh.layers * bundle.mesh.cell_size_mm[2]
+    thickness = designed + thicker * bundle.tolerances["thickness_mm"]
+    ratio = bundle.material.poissons_ratio + softer * bundle.tolerances["poissons_ratio"]
+    mesh = refined(bundle.mesh.stretched(thickness / designed))
+    operator = surface_operator(mesh, replace(bundle.material, poissons_ratio=ratio), "bbar", "pcg")
+    return BuiltGel(mesh, operator, bundle.material.youngs_modulus_mpa, ratio, thickness)
+
+
+def _strain(disc: PressedDisc, contact_mm: float) -> float:
+    """Mean of the radial motion over the radius within a contact, by area."""
+    state = int(np.argmin(np.abs(disc.contact_mm - contact_mm)))
+    inside = (disc.r_mm > 0) & (disc.r_mm <= disc.contact_mm[state])
+    r = disc.r_mm[inside]
+    return float(np.average(disc.outward_mm[state][inside] / r, weights=r))
+
+
+def _round_motion(place: Array, r_mm: Array, outward_mm: Array, height_mm: Array) -> Motion:
+    out, down = CubicSpline(r_mm, outward_mm), CubicSpline(r_mm, height_mm)
+
+    def motion(places_mm: Array) -> Array:
+        away = places_mm - place
+        r = np.minimum(np.hypot(*away.T), r_mm[-2])
+        return np.column_stack([away * (out(r) / np.maximum(r, 1e-9))[:, None], down(r)])
+
+    return motion
+
+
+def _wrench(points_mm: Array, force_n: Array) -> Array:
+    rest = points_mm * [1.0, 1.0, 0.0]
+    return np.concatenate([force_n.sum(axis=0), np.cross(rest, force_n).sum(axis=0)])
+
+
+def _centre(points_mm: Array, force_n: Array) -> Array:
+    push = force_n[:, 2]
+    return np.asarray((points_mm[:, :2] * push[:, None]).sum(axis=0) / push.sum())

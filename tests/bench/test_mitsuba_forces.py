@@ -1,0 +1,44 @@
+"""Forces of the command line from pictures that Mitsuba 3 drew of contacts of known force."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bench_data import DOCS
+from mitsuba_forces import CALIBRATED, TRACED, Scores, Trial
+
+STORED = json.loads((DOCS / "data" / "mitsuba_forces.json").read_text("utf-8"))
+
+
+def hold(record: Mapping[str, Any], way: str) -> None:
+    """Errors and deviations that are claimed for both lights."""
+    some = Scores.of(record, way)
+    assert some.unknown == 0
+    assert np.median(np.abs(some.normal_error)) < 0.12
+    assert np.median(some.shear_error_n) < 0.012
+    assert np.median(some.centre_off_mm) < 0.3
+
+
+@pytest.mark.parametrize("way", [TRACED, CALIBRATED])
+def test_stored_forces_keep_their_errors_and_deviations(way: str) -> None:
+    hold(STORED, way)
+    z = Scores.of(STORED, way).z[:, :3]
+    assert (np.sqrt((z**2).mean(axis=0)) < 1.5).all()
+
+
+@pytest.mark.slow
+def test_forces_from_pictures_drawn_anew(tmp_path: Path) -> None:
+    """Four contacts with a quarter of the light that the stored forces have."""
+    pytest.importorskip(
+        "mitsuba",
+        reason="Mitsuba 3 is absent: forces were NOT judged on its pictures (extra `mitsuba`)",
+    )
+    if not os.environ.get("DRJIT_LIBLLVM_PATH"):
+        pytest.skip("DRJIT_LIBLLVM_PATH names no libLLVM: forces were NOT judged by Mitsuba")
+    hold(Trial(tmp_path, 4, 2_000_000, presses=0).scored(), TRACED)
