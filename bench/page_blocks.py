@@ -21,7 +21,6 @@ import data_set_cost
 import force_sigma
 import learned_forces
 import linear_gel
-import mitsuba_forces
 import real_locations
 import twin_batch
 import twin_fine
@@ -32,6 +31,7 @@ from bench_data import DOCS, write_whole
 from page import (
     drawn_light_table,
     force_tables,
+    mitsuba_scores,
     page_tables,
     planning_figure,
     tolerance_tables,
@@ -75,7 +75,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "ladders": _from("force_ladders", force_tables.ladder_tables),
         "large-strain": _from("force_ladders", page_tables.large_strain),
         "sigma": _from("force_sigma", force_sigma.table),
-        "mitsuba-forces": _from("mitsuba_forces", mitsuba_forces.table),
+        "mitsuba-forces": _from("mitsuba_forces", mitsuba_scores.table),
     },
     "docs/digital_twin.md": {
         "validation": _from("twin_validation", twin_tables.validation_text),

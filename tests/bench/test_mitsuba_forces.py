@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from bench_data import DOCS
-from mitsuba_forces import CALIBRATED, TRACED, Scores, Trial
+from mitsuba_forces import Trial
+from page.mitsuba_scores import CALIBRATED, TRACED, Scores
 
 STORED = json.loads((DOCS / "data" / "mitsuba_forces.json").read_text("utf-8"))
 
