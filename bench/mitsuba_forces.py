@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from bench_data import DOCS, write_data, write_whole
 from numpy.typing import NDArray
-from page.mitsuba_scores import CALIBRATED, TRACED, drawn, table
+from page.mitsuba_scores import CALIBRATED, GEL_KNOWN, TRACED, drawn, table
 from rigs.machine import installed, machine
 
 Array = NDArray[np.float64]
@@ -164,11 +164,48 @@ class Trial:
             )  # fmt: skip
             rows = read_rows(run / "wrenches.csv")
             found[name] = {"at_rest": _at_rest(rows[0::2]), "rows": [_row(r) for r in rows[1::2]]}
+        found[GEL_KNOWN] = {"rows": self._by_known_gels(contacts)}
         truth = [
             {"name": c.name, "wrench": _short(c.wrench), "centre_mm": _short(c.centre_mm)}
             for c in contacts
         ]
         return {"truth": truth, "ways": found}
+
+    def _by_known_gels(self, contacts: list[Any]) -> list[dict[str, Any]]:
+        """Forces by pipelines that have the gel of each contact, without tolerances.
+
+        The modulus only scales the forces.
+        """
+        from dataclasses import replace
+
+        from gelslim_force import open_sensor, read_reference
+
+        designed = self.pads.bundle
+        thickness = designed.mesh.layers * designed.mesh.cell_size_mm[2]
+        rest = read_reference(self.kept / "rest.png")
+        opened: dict[tuple[float, float], Any] = {}
+        rows = []
+        for number in range(len(contacts)):
+            gel = self.pads.gel(number // 2)
+            key = gel.thickness_mm, gel.poissons_ratio
+            if key not in opened:
+                built = designed.with_gel(replace(designed.material, poissons_ratio=key[1]))
+                mesh = designed.mesh.stretched(key[0] / thickness)
+                known = replace(built, mesh=mesh, tolerances={})
+                opened[key] = open_sensor(known, reference=rest, indenter="unknown")
+            opened[key].process(rest)
+            frame = read_reference(self.kept / "frames" / f"{2 * number + 1:03}.png")
+            result = opened[key].process(frame)
+            wrench = result.wrench
+            rows.append(
+                {
+                    "wrench": _short(gel.young * np.asarray(wrench.vector)),
+                    "sigma": _short(gel.young * np.asarray(wrench.standard_deviation)),
+                    "centre_mm": _short(result.field.centre_of_pressure_mm),
+                    "problems": "; ".join(str(v) for v in result.problems),
+                }
+            )
+        return rows
 
     def _calibrated_light(self, calibration: str) -> Path:
         """The light by presses of a ball."""

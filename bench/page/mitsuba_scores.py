@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 Record = Mapping[str, Any]
 TRACED, CALIBRATED = ("light as traced", "light calibrated")
 """What is told of the light beside the camera's calibration."""
-COLOURS = {TRACED: "#c4580a", CALIBRATED: "#1f4e8c"}
+GEL_KNOWN = "gel known, light as traced"
+COLOURS = {TRACED: "#c4580a", CALIBRATED: "#1f4e8c", GEL_KNOWN: "#2d8a57"}
 LABELS = ("F_x", "F_y", "F_z")
 _NORMAL_95 = 1.96
 
@@ -123,7 +124,7 @@ def drawn(record: Record) -> bytes:
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, 3)
     for k, axes in enumerate(panels):
-        for way, shift in zip(record["ways"], (-0.004, 0.004), strict=False):
+        for way, shift in zip(COLOURS, (-0.004, 0.0, 0.004), strict=True):
             some = Scores.of(record, way)
             axes.errorbar(
                 some.truth[:, k] + shift, some.found[:, k], some.sigma[:, k],

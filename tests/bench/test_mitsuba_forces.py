@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bench_data import DOCS
 from mitsuba_forces import Trial
-from page.mitsuba_scores import CALIBRATED, TRACED, Scores
+from page.mitsuba_scores import CALIBRATED, GEL_KNOWN, TRACED, Scores
 
 STORED = json.loads((DOCS / "data" / "mitsuba_forces.json").read_text("utf-8"))
 
@@ -31,6 +31,16 @@ def test_stored_forces_keep_their_errors_and_deviations(way: str) -> None:
     hold(STORED, way)
     z = Scores.of(STORED, way).z[:, :3]
     assert (np.sqrt((z**2).mean(axis=0)) < 1.5).all()
+
+
+def test_stored_forces_of_a_known_gel_are_within_three_percent() -> None:
+    """What is left of the error is that of the method: light, markers, mesh and camera."""
+    some = Scores.of(STORED, GEL_KNOWN)
+    assert some.unknown == 0
+    assert np.median(np.abs(some.normal_error)) < 0.04
+    assert abs(some.normal_error.mean()) < 0.03
+    assert np.median(some.shear_error_n) < 0.003
+    assert (np.sqrt((some.z[:, :3] ** 2).mean(axis=0)) < 1.5).all()
 
 
 @pytest.mark.slow
