@@ -17,18 +17,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import data_set_cost
-import force_sigma
-import learned_forces
-import linear_gel
-import real_locations
-import twin_batch
-import twin_fine
-import twin_look
-import twin_skin
-import twin_steps
-from bench_data import DOCS, write_whole
-from page import (
+from bench.bench_data import DOCS, ROOT, write_whole
+from bench.force import force_sigma
+from bench.learning import data_set_cost, learned_forces, real_locations
+from bench.page import (
     drawn_light_table,
     force_tables,
     mitsuba_scores,

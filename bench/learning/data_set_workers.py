@@ -24,8 +24,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import psutil
-from bench_data import DOCS, write_data
-from rigs.machine import machine
+
+from bench.bench_data import DOCS, write_data
+from bench.rigs.machine import machine
 
 SCENE = DOCS.parent / "designs" / "scenes" / "shear_sphere.yaml"
 FRAMES = 31

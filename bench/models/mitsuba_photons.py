@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.models.mitsuba_finger import Meshes, finger_shapes, sheet
 from gelslim_optics.light.scene import LightScene, Medium
-from models.mitsuba_finger import Meshes, finger_shapes, sheet
 
 Array = NDArray[np.float64]
 Rays = NDArray[np.float32]

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
+from bench.models.mitsuba_finger import film_camera
+from bench.models.mitsuba_photons import coat_of
 from gelslim_optics.camera.virtual_camera import VirtualCamera
-from models.mitsuba_finger import film_camera
-from models.mitsuba_photons import coat_of
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]

@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from models.mitsuba_finger import renderer
-from models.mitsuba_photons import Photons, irradiance, kept_light, of_one_source, stage
-from models.mitsuba_view import Print, Response, Sight, built_camera, sight
 from numpy.typing import NDArray
 
+from bench.models.mitsuba_finger import renderer
+from bench.models.mitsuba_photons import Photons, irradiance, kept_light, of_one_source, stage
+from bench.models.mitsuba_view import Print, Response, Sight, built_camera, sight
+from bench.rigs.outside_contacts import Motion
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_optics.light.scene import LightScene
 from gelslim_optics.light.source import LedRow
-from rigs.outside_contacts import Motion
 
 Array = NDArray[np.float64]
 OFFSET_MM, GAP_MM, PRINT_MM = 0.15, 0.1, 0.01

@@ -8,7 +8,7 @@ NEEDED = (
     "gelslim_twin.datasets.shard_task",
     "gelslim_twin.simulation.picture",
     "gelslim_twin.contact.solver",
-    "gelslim_twin.contact.tool",
+    "gelslim_twin.tools.tool",
     "gelslim_twin.render.surface_kernel",
     "gelslim_twin.render.dot_kernel",
     "gelslim_twin.render.image_kernel",

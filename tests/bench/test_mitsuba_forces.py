@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench_data import DOCS
-from mitsuba_forces import Trial
-from page.mitsuba_scores import CALIBRATED, GEL_KNOWN, TRACED, Scores
+
+from bench.bench_data import DOCS
+from bench.force.mitsuba_forces import Trial
+from bench.page.mitsuba_scores import CALIBRATED, GEL_KNOWN, TRACED, Scores
 
 STORED = json.loads((DOCS / "data" / "mitsuba_forces.json").read_text("utf-8"))
 

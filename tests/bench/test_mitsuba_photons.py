@@ -18,11 +18,11 @@ if not os.environ.get("DRJIT_LIBLLVM_PATH"):
         "DRJIT_LIBLLVM_PATH names no libLLVM: pictures of known forces were NOT drawn by Mitsuba",
         allow_module_level=True,
     )
-from models.mitsuba_finger import LONGEST_PATH, film_camera, renderer
-from models.mitsuba_photons import irradiance, kept_light, of_one_source, stage
-from models.mitsuba_view import Print, sight
 from shipped_fingers import DESIGNS
 
+from bench.models.mitsuba_finger import LONGEST_PATH, film_camera, renderer
+from bench.models.mitsuba_photons import irradiance, kept_light, of_one_source, stage
+from bench.models.mitsuba_view import Print, sight
 from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.optics import guide_profile, virtual_camera
 from gelslim_cad.light.scene import light_scene

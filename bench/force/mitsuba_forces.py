@@ -1,7 +1,7 @@
 """Forces of objects of unknown shape, from pictures by Mitsuba 3 and contacts of other elements.
 
-    DRJIT_LIBLLVM_PATH=/usr/lib/x86_64-linux-gnu/libLLVM-19.so python bench/mitsuba_forces.py
-    python bench/mitsuba_forces.py --figure     # table and figure from the data again
+    DRJIT_LIBLLVM_PATH=/usr/lib/x86_64-linux-gnu/libLLVM-19.so python -m bench.force.mitsuba_forces
+    python -m bench.force.mitsuba_forces --figure     # table and figure from the data again
 
 Writes docs/data/mitsuba_forces.json and docs/images/mitsuba_forces.png. A finger `gelslim2` that is
 built a little beside its design is photographed at rest, under contacts of known force and under a
@@ -27,13 +27,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bench_data import DOCS, write_data, write_whole
 from numpy.typing import NDArray
-from page.mitsuba_scores import CALIBRATED, GEL_KNOWN, TRACED, drawn, table
-from rigs.machine import installed, machine
+
+from bench.bench_data import DOCS, ROOT, write_data, write_whole
+from bench.page.mitsuba_scores import CALIBRATED, GEL_KNOWN, TRACED, drawn, table
+from bench.rigs.machine import installed, machine
 
 Array = NDArray[np.float64]
-DESIGN = Path(__file__).parents[1] / "designs" / "gelslim2.yaml"
+DESIGN = ROOT / "designs" / "gelslim2.yaml"
 KEPT = Path("out") / "mitsuba_forces"
 CONTACTS, PRESSES, RAYS = 16, 8, 8_000_000
 COLUMNS = ("fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm")
@@ -87,8 +88,7 @@ class Trial:
     @cached_property
     def pads(self) -> Any:
         """Contacts of known force."""
-        from rigs.outside_contacts import OutsidePads
-
+        from bench.rigs.outside_contacts import OutsidePads
         from ifem_export.bundle.files import load_bundle
 
         return OutsidePads(load_bundle(self.bundle))
@@ -96,8 +96,7 @@ class Trial:
     @cached_property
     def sensor(self) -> Any:
         """The built finger."""
-        from rigs.mitsuba_sensor import MitsubaSensor
-
+        from bench.rigs.mitsuba_sensor import MitsubaSensor
         from gelslim_cad.dimensions import derive
         from gelslim_cad.sensor import marker_grid
         from gelslim_cad.spec.reader import read_spec
@@ -209,7 +208,7 @@ class Trial:
 
     def _calibrated_light(self, calibration: str) -> Path:
         """The light by presses of a ball."""
-        from rigs.outside_contacts import CALIBRATION_BALL_MM
+        from bench.rigs.outside_contacts import CALIBRATION_BALL_MM
 
         path = self.kept / "light.json"
         gelslim(
