@@ -57,6 +57,38 @@ def taps_of_two_pitches(
 
 
 @njit(**COMPILED)
+def mark_columns(starts: Any, columns: Any, rows: Any, found: Any) -> None:
+    """Mark with 0 in `found` the columns that some rows of a sparse matrix by rows have."""
+    for row in rows:
+        for k in range(starts[row], starts[row + 1]):
+            found[columns[k]] = 0
+
+
+@njit(**COMPILED)
+def interpolated_rows(
+    starts: Any, columns: Any, values: Any, rows: Any, row_of: Any, right: Any, found: Any
+) -> None:
+    """Some rows (m,) of the product of a sparse matrix by rows and a full one.
+
+    Args:
+        starts: (f + 1,) first entry of each row of the sparse matrix.
+        columns: Of its entries.
+        values: Of its entries.
+        rows: (m,) of it.
+        row_of: (c,) row of `right` for each column.
+        right: (n, q).
+        found: Receives (m, q).
+    """
+    for i in range(len(rows)):
+        out = found[i]
+        out[:] = 0
+        for k in range(starts[rows[i]], starts[rows[i] + 1]):
+            row, weight = right[row_of[columns[k]]], right.dtype.type(values[k])
+            for j in range(len(out)):
+                out[j] += weight * row[j]
+
+
+@njit(**COMPILED)
 def stencil_columns(
     stencil: Any, at: Any, places: Any, rows: Any, columns: Any, found: Any
 ) -> None:

@@ -136,13 +136,21 @@ class FinerPressure:
             near: (m,) places of the heights.
             parts: What is unknown.
         """
-        from gelslim_force.joint.finer_kernel import stencil_columns
+        from gelslim_force.joint.finer_kernel import (
+            interpolated_rows,
+            mark_columns,
+            stencil_columns,
+        )
 
-        lattice = self.surface.lattice
-        interpolation = self.surface.interpolation[near]
-        seen = np.unique(interpolation.indices)
+        lattice, interpolation = self.surface.lattice, self.surface.interpolation
+        entries = interpolation.indptr, interpolation.indices
+        row = np.full(len(self.surface.place), -1, dtype=np.intp)
+        mark_columns(*entries, near, row)
+        seen = np.flatnonzero(row >= 0)
+        row[seen] = np.arange(len(seen))
         rough = self.in_parts(responses.of_heights(parts.bearing, seen), parts)
-        found = np.ascontiguousarray(interpolation[:, seen].astype(np.float32) @ rough)
+        found = np.empty((len(near), parts.size), dtype=rough.dtype)
+        interpolated_rows(*entries, interpolation.data, near, row, rough, found)
         number = np.full(len(lattice.place), -1, dtype=np.intp)
         number[near] = np.arange(len(near))
         at = lattice.place[parts.places]
