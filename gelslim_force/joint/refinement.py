@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-_MARGIN, _TOLERANCE = 1.05, 3e-4
+_MARGIN, _TOLERANCE = 1.05, 5e-4
 _SIZES = 2.0
 """Standard deviation of the pressure on a place over that on a node."""
 

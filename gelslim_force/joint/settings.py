@@ -86,7 +86,7 @@ class JointSettings:
     most_sigma: float = 0.4
     least_pressure: float = 0.15
     deep_least_pressure: float = 0.25
-    light_reach: int = 3
+    light_reach: int = 2
     marker_reach: int = 6
     rounds: tuple[int, ...] = (2, 1)
     following_rounds: tuple[int, ...] = (1, 1)
