@@ -123,7 +123,7 @@ def all_chains(
     loose = PipelineSettings(budget=Budget(error=LOOSE))
     # The rig draws grey values in proportion to the light.
     drawn = JointSettings(gamma=1.0)
-    for suffix, finer in (("", True), (", forces on the nodes", False)):
+    for suffix, finer in (("", False), (", finer pressure", True)):
         anything = unknown_shape(
             rig.bundle, calibration, frames[0], finer_pressure=finer, settings=drawn
         )

@@ -45,10 +45,9 @@ Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
 _MARKER_LIMIT = 3.0
 """Standard deviations beyond which a marker counts linearly."""
-_LEAST_NODES, _CLOSE = 3, 1
-"""The latter: steps about a contact within which light depends on heights at half the pitch."""
-_ROUGH_TOLERANCE = 1e-3
-"""Of forces on the nodes that those at half the pitch follow."""
+_LEAST_NODES, _FINER_REACH, _CLOSE = 3, 2, 1
+"""The latter for forces at half the pitch: `light_reach`, and where heights there count."""
+_ROUGH_TOLERANCE = 2e-4  # of forces on the nodes that those at half the pitch follow
 _SETTLED = 0.01
 """Change of the force, relative to it, after which another linearisation changes little."""
 _HELD_SLOPE = 0.07
@@ -232,7 +231,7 @@ class JointEstimator:
         return self.moved.nodes(lateral, self._noise_mm(frame), self.settings.marker_mm)
 
     def _noise_mm(self, frame: FrameData) -> Array:
-        """(n,) standard deviation of the markers' places on the gel by the noise of the image."""
+        """(n,) standard deviation of the markers' places by the noise of the image."""
         return frame.noise_px * self.markers.mean_mm_per_px
 
     def _round(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
@@ -319,7 +318,8 @@ class JointEstimator:
         """
         if self.light is None or self.law is None or frame.seen is None:
             return None
-        wide = self.lattice.widened(near, self.settings.light_reach)
+        reach = self.settings.light_reach if self.pressure is None else _FINER_REACH
+        wide = self.lattice.widened(near, reach)
         relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
         finer = None
         if self.finer is not None:

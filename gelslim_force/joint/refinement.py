@@ -94,7 +94,7 @@ class _Refinement:
             equations,
             self._sought(found, force),
             markers.after(found - before),
-            light.unexplained(higher),
+            state.unexplained,
         )
 
     def _before(self, state: FitState) -> Array:

@@ -86,8 +86,8 @@ class JointSettings:
     most_sigma: float = 0.4
     least_pressure: float = 0.15
     deep_least_pressure: float = 0.25
-    light_reach: int = 2
-    marker_reach: int = 6
+    light_reach: int = 4
+    marker_reach: int = 8
     rounds: tuple[int, ...] = (2, 1)
     following_rounds: tuple[int, ...] = (1, 1)
     deep_rounds: int = 3

@@ -162,7 +162,7 @@ def unknown_shape(
     reference: NDArray[np.uint8] | None,
     *,
     gel: str = "linear",
-    finer_pressure: bool = True,
+    finer_pressure: bool = False,
     settings: JointSettings | None = None,
     light: LightCalibration | None = None,
     more: Sequence[tuple[Bundle, float]] = (),

@@ -112,10 +112,10 @@ def test_a_finer_pressure_is_fitted_where_it_is_asked_for() -> None:
     for asked in (False, True):
         made = unknown_source(sensor, camera, rest, PipelineSettings(finer_pressure=asked))
         assert (made.estimator.pressure is not None) == asked
-    source = unknown_shape(sensor, camera, rest, finer_pressure=False, settings=LINEAR_CAMERA)
+    source = unknown_shape(sensor, camera, rest, finer_pressure=True, settings=LINEAR_CAMERA)
     truth = pressed(13)
-    plain = ForcePipeline(sensor, camera, normal=source).process(truth.image)
-    finer = processed(truth.image)
+    finer = ForcePipeline(sensor, camera, normal=source).process(truth.image)
+    plain = processed(truth.image)
     assert finer.wrench is not None
     assert plain.wrench is not None
     off = np.abs(finer.wrench.vector - truth.wrench)
