@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import njit
 
+from gelslim_core.kernel_cache import drop_stale
 from gelslim_force.joint.light_kernel import cubic
-from ifem_export.inverse.contact_fit_kernel import accelerated
+
+drop_stale(["finer_kernel"], ["light_kernel"], Path(__file__).parent)
 
 COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 _TAPS = 4
@@ -174,45 +176,3 @@ def add_smoothness(
             slope[source[i, a]] += pull / 4
             for b in range(4):
                 hessian[source[i, a], source[i, b]] += stiff / 16
-
-
-@njit(**COMPILED)
-def project(force: Any, limit: Any) -> None:
-    """Bring pulls to 0, and tangential forces within their limits.
-
-    Args:
-        force: (q + 2p,) q normal forces, which push where they are negative, and p tangential ones.
-        limit: (p,) most of each tangential force.
-    """
-    count = len(force) - 2 * len(limit)
-    for k in range(count):
-        force[k] = min(force[k], 0)
-    for n in range(len(limit)):
-        k = count + 2 * n
-        size = math.hypot(force[k], force[k + 1])
-        if size > limit[n]:
-            force[k] *= limit[n] / size
-            force[k + 1] *= limit[n] / size
-
-
-@njit(**COMPILED)
-def descend(
-    gram: Any, slope: Any, force: Any, limit: Any, step: Any, tolerance: Any, most: Any
-) -> Any:
-    """Improve `force` (q + 2p,) in place by accelerated projected gradients with restart.
-
-    It is `contact_fit_kernel.descend` within the limits of `project`.
-
-    Returns:
-        The relative change of the last step, and the number of steps.
-    """
-    start = force.copy()
-    project(force, limit)
-    ahead = force.copy()
-    momentum, change, steps = 1.0, math.inf, 0
-    while steps < most and change > tolerance:
-        steps += 1
-        moved = ahead - step * (slope + gram @ (ahead - start))
-        project(moved, limit)
-        change, momentum = accelerated(moved, ahead, force, momentum)
-    return change, steps

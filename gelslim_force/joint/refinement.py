@@ -150,14 +150,13 @@ def _mask(force: Array, nodes: Nodes) -> NDArray[np.bool_]:
 
 
 def _solved(equations: NormalEquations, before: Array, limit: Array) -> Array:
-    from gelslim_force.joint.finer_kernel import descend
-    from ifem_export.inverse.contact_fit_kernel import largest_eigenvalue
+    from ifem_export.inverse.contact_fit_kernel import descend_within, largest_eigenvalue
 
     gram, slope, force, most = (
         a.astype(np.float32) for a in (equations.hessian, equations.slope, before, limit)
     )
     step = np.float32(1.0 / (_MARGIN * largest_eigenvalue(gram)))
-    descend(gram, slope, force, most, step, _TOLERANCE, STEPS)
+    descend_within(gram, slope, force, most, step, _TOLERANCE, STEPS)
     return force.astype(float)
 
 

@@ -110,3 +110,45 @@ def descend(
         project(moved, friction)
         change, momentum = accelerated(moved, ahead, force, momentum)
     return change, steps
+
+
+@njit(**COMPILED)
+def project_within(force: Any, limit: Any) -> None:
+    """Bring pulls to 0, and tangential forces within their limits.
+
+    Args:
+        force: (q + 2p,) q normal forces, which push where they are negative, and p tangential ones.
+        limit: (p,) most of each tangential force.
+    """
+    count = len(force) - 2 * len(limit)
+    for k in range(count):
+        force[k] = min(force[k], 0)
+    for n in range(len(limit)):
+        k = count + 2 * n
+        size = math.hypot(force[k], force[k + 1])
+        if size > limit[n]:
+            force[k] *= limit[n] / size
+            force[k + 1] *= limit[n] / size
+
+
+@njit(**COMPILED)
+def descend_within(
+    gram: Any, slope: Any, force: Any, limit: Any, step: Any, tolerance: Any, most: Any
+) -> Any:
+    """Improve `force` (q + 2p,) in place by accelerated projected gradients with restart.
+
+    It is `descend` within the limits of `project_within`.
+
+    Returns:
+        The relative change of the last step, and the number of steps.
+    """
+    start = force.copy()
+    project_within(force, limit)
+    ahead = force.copy()
+    momentum, change, steps = 1.0, math.inf, 0
+    while steps < most and change > tolerance:
+        steps += 1
+        moved = ahead - step * (slope + gram @ (ahead - start))
+        project_within(moved, limit)
+        change, momentum = accelerated(moved, ahead, force, momentum)
+    return change, steps

@@ -11,7 +11,6 @@ from scipy.optimize import lsq_linear
 from sensor_samples import sensor_bundle
 from test_finer_surface import RADIUS_MM, nodal_forces, true_heights
 
-from gelslim_force.joint.finer_kernel import descend
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.node_lattice import NodeLattice
@@ -23,6 +22,7 @@ from ifem_export.compliance.finer_response import (
     finer_response,
     half_step_response,
 )
+from ifem_export.inverse.contact_fit_kernel import descend_within
 from ifem_export.markers.interpolation import marker_to_node
 
 Array = NDArray[np.float64]
@@ -147,9 +147,9 @@ def test_descent_finds_the_least_squares_within_bounds(seed: int) -> None:
     slope = gram @ force - rows.T @ data
     step = 1 / np.linalg.eigvalsh(gram)[-1]
     start = np.minimum(force, upper)
-    descend(gram, slope, start, np.full(2, 1e3), step, 1e-12, 5000)
+    descend_within(gram, slope, start, np.full(2, 1e3), step, 1e-12, 5000)
     np.testing.assert_allclose(start, true, atol=1e-7)
     limited = force.copy()
-    descend(gram, slope, limited, np.full(2, 0.01), step, 1e-12, 5000)
+    descend_within(gram, slope, limited, np.full(2, 0.01), step, 1e-12, 5000)
     assert np.hypot(*limited[10:].reshape(-1, 2).T).max() <= 0.01 * (1 + 1e-9)
     assert limited[:10].max() <= 0
