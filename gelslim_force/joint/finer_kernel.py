@@ -23,8 +23,8 @@ def taps_of_two_pitches(
 ) -> None:
     """Places (n, 16), and weights (n, 16) of slopes along x and y, of cubic convolution.
 
-    It is that of all places of a finer lattice where `close` says so, and that of every other one
-    elsewhere.
+    The interpolation uses all places of a finer lattice about the places marked in `close`, and
+    only every other place elsewhere.
 
     Args:
         at: (n, 2) in steps of the finer lattice.

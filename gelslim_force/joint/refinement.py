@@ -2,8 +2,9 @@
 
 Forces on the nodes cannot express a pressure that ends between two of them, and are too small as a
 whole. Normal forces on the nodes and half way between them can, up to half a step beyond the nodes
-that press. They are found with the tangential forces on the nodes by one more linearisation, and
-go to the nodes with the same resultant and moments.
+that press. Inside the contact the pressure half way between nodes is the mean of that on the nodes
+around it; only about the rim is it unknown. These forces are found with the tangential forces on
+the nodes by one more linearisation, and go to the nodes with the same resultant and moments.
 
 The prior is that of the nodes for the same traction. The sum over neighbours of squared
 differences of a traction in the plane, ∫ |∇t|² dA, does not depend on the pitch; that of squared
