@@ -23,7 +23,7 @@ from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.checked_indenter import CheckedIndenter
 from gelslim_force.joint.light_calibration import LightCalibration
-from gelslim_force.joint.settings import WITNESS, JointSettings
+from gelslim_force.joint.settings import ON_NODES, WITNESS, JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, layer_stiffness_n_mm, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.presses.gel_calibration import GelCalibration
@@ -287,12 +287,13 @@ def unknown_source(
         )
     calibration.require_bundle(bundle)
     chosen = settings or PipelineSettings()
+    on_nodes = None if reference is None or chosen.finer_pressure else ON_NODES
     return unknown_shape(
         bundle,
         calibration,
         reference,
         gel=chosen.gel,
-        finer_pressure=chosen.finer_pressure,
+        settings=on_nodes,
         light=light,
         more=more,
     )

@@ -20,6 +20,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,7 @@ from gelslim_core.budget.budget import Budget
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import NormalSource
-from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.settings import ON_NODES, JointSettings
 from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import indenter_source
@@ -122,11 +123,9 @@ def all_chains(
     known = [share * rig.press.nodes_mm[:, 2] for share in shares(CYCLE)]
     loose = PipelineSettings(budget=Budget(error=LOOSE))
     # The rig draws grey values in proportion to the light.
-    drawn = JointSettings(gamma=1.0)
-    for suffix, finer in (("", False), (", finer pressure", True)):
-        anything = unknown_shape(
-            rig.bundle, calibration, frames[0], finer_pressure=finer, settings=drawn
-        )
+    for suffix, chosen in (("", JointSettings()), (", on nodes", ON_NODES)):
+        drawn = replace(chosen, gamma=1.0)
+        anything = unknown_shape(rig.bundle, calibration, frames[0], settings=drawn)
         chain = ForcePipeline(rig.bundle, calibration, None, anything)
         yield f"any object{suffix}", pipeline_chain(chain, frames, clock)
     for suffix, settings in (("", None), (f", {LOOSE:.0%}", loose)):

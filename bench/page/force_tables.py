@@ -6,7 +6,7 @@ from typing import Any
 
 SHORT = {
     "any object": "any object, from light and markers",
-    "any object, finer pressure": "the same with `--finer-pressure`",
+    "any object, on nodes": "the same with `--no-finer-pressure`",
     "depth given, 25%": "depth given",
     "tangential, 25%": "tangential forces alone (`--indenter none`)",
     "sphere seen, 25%": "only the ball's size given, contact found in the picture",

@@ -233,9 +233,9 @@ GelLaw = Annotated[str, typer.Option(help="Law of the gel: linear, neo_hookean o
 FinerPressure = Annotated[
     bool,
     typer.Option(
-        "--finer-pressure",
-        help="Fit an unknown shape at last with normal forces at half the pitch of the nodes: "
-        "no common error of 2 %, more than half as long again.",
+        "--finer-pressure/--no-finer-pressure",
+        help="Fit an unknown shape at last with normal forces at half the pitch of the nodes. "
+        "Without it, a frame takes two thirds of the time, and the normal force is 2 % off.",
     ),
 ]
 Friction = Annotated[float, typer.Option(min=0, help="Coefficient of Coulomb friction.")]

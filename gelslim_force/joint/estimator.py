@@ -45,11 +45,12 @@ Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
 _MARKER_LIMIT = 3.0
 """Standard deviations beyond which a marker counts linearly."""
-_LEAST_NODES, _FINER_REACH, _CLOSE = 3, 2, 1
-"""The latter for forces at half the pitch: `light_reach`, and where heights there count."""
+_LEAST_NODES, _CLOSE = 3, 1
+"""The latter: steps about the contact within which heights at half the pitch count."""
 _ROUGH_TOLERANCE = 2e-4  # of forces on the nodes that those at half the pitch follow
-_SETTLED = 0.01
-"""Change of the force, relative to it, after which another linearisation changes little."""
+_SETTLED, _FAR = 0.01, 0.2
+"""Changes of the force, relative to it: one after which another linearisation changes little, and
+one since the frame before, after which forces on the nodes need another."""
 _HELD_SLOPE = 0.07
 """Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
 random contacts then differ from those of another linearisation by 0.03 standard deviations in the
@@ -151,7 +152,10 @@ class JointEstimator:
         rounds = self.settings.following_rounds
         if self.pressure is None or frame.seen is None:
             return self._rounds(frame, nodes, state, rounds)
+        before = state
         for _ in range(rounds[0]):
+            state = self._round(frame, np.flatnonzero(nodes), state)
+        if not state.near(before, _FAR):
             state = self._round(frame, np.flatnonzero(nodes), state)
         nodes = self._pressing(nodes, state)
         if self.deepness(state) > 0:
@@ -318,8 +322,7 @@ class JointEstimator:
         """
         if self.light is None or self.law is None or frame.seen is None:
             return None
-        reach = self.settings.light_reach if self.pressure is None else _FINER_REACH
-        wide = self.lattice.widened(near, reach)
+        wide = self.lattice.widened(near, self.settings.light_reach)
         relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
         finer = None
         if self.finer is not None:

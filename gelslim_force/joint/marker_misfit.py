@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.joint.deepness import deepness
 from gelslim_force.joint.estimator import JointEstimator
 from gelslim_force.joint.fit_state import JointForces
 from gelslim_force.motion.marker_motion import MarkerRays
@@ -24,9 +25,10 @@ _INSIDE = 0.3
 _LEAST = 4
 _MOST_SIGMAS = 3.0
 """Of the mean square of the noise, which is no misfit."""
-_USUAL_MM, _USUAL_SHARE = 0.0005, 0.0025
+_USUAL_MM, _USUAL_SHARE, _DEEP_SHARE = 0.0005, 0.0025, 0.015
 """Root mean square of the residuals in contacts that the light shows as it should: of small
-motions, and as a share of the motion."""
+motions, and as a share of the motion in a contact that is not deep and in a deep one, about whose
+steep rim the surface is not linear between the nodes."""
 _USUAL_UNEXPLAINED = 0.3
 """Share of the change of light that forces leave unexplained in most frames, up to which it is that
 of noise and mesh. A larger one shows another cause, also where the forces explain the markers."""
@@ -67,5 +69,7 @@ def marker_misfit(
     noise_mm = noise_px * estimator.markers.usual_mm_per_px
     by_chance = noise_mm**2 * (1 + _MOST_SIGMAS / np.sqrt(len(seen)))
     beyond = float(np.mean(np.square(seen - model[inside, :2]))) - by_chance
-    expected = _USUAL_MM**2 + _USUAL_SHARE**2 * float(np.mean(np.square(seen)))
+    deep = deepness(found.displacement_mm[:, 2], estimator.deep_mm)
+    share = (1 - deep) * _USUAL_SHARE + deep * _DEEP_SHARE
+    expected = _USUAL_MM**2 + share**2 * float(np.mean(np.square(seen)))
     return float(np.sqrt(max(beyond, 0.0) / expected))

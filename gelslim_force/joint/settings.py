@@ -61,6 +61,8 @@ class JointSettings:
             `rounds`, or instead of them where the frame before had this contact.
         deep_rounds: Most further linearisations of a deep contact, until the force changes by less
             than a hundredth.
+        finer_pressure: With light, the last linearisation is with normal forces at half the pitch
+            of the nodes.
 
     Raises:
         ValueError: A value is impossible.
@@ -70,7 +72,7 @@ class JointSettings:
     marker_mm: float = 0.0015
     marker_share: float = 0.02
     bending_share: float = 0.8
-    light_error: float = 0.02
+    light_error: float = 0.015
     light_share: float = 0.05
     deep_light_share: float = 0.2
     height_share: float = 0.07
@@ -84,13 +86,14 @@ class JointSettings:
     unseen_force: float = 0.2
     unseen_by_markers: float = 0.5
     most_sigma: float = 0.4
-    least_pressure: float = 0.15
+    least_pressure: float = 0.2
     deep_least_pressure: float = 0.25
-    light_reach: int = 4
-    marker_reach: int = 8
+    light_reach: int = 2
+    marker_reach: int = 6
     rounds: tuple[int, ...] = (2, 1)
     following_rounds: tuple[int, ...] = (1, 1)
     deep_rounds: int = 3
+    finer_pressure: bool = True
 
     def with_light(self, light: LightCalibration) -> JointSettings:
         """The settings for a calibrated light.
@@ -119,9 +122,14 @@ class JointSettings:
             raise ValueError("rounds and following_rounds must be at least 1")
 
 
-MARKERS_ALONE = JointSettings(marker_mm=0.004, roughness=0.22, least_pressure=0.2, rounds=(2, 1, 1))
+ON_NODES = JointSettings(
+    light_error=0.02, least_pressure=0.15, light_reach=4, marker_reach=8, finer_pressure=False
+)
+"""With light, and normal forces on the nodes alone. These resolve less of the change of the light,
+and more of it is used."""
+MARKERS_ALONE = JointSettings(marker_mm=0.004, roughness=0.22, marker_reach=8, rounds=(2, 1, 1))
 """Without light: markers show the region less sharply, so that more nodes have to be removed, and
 what the region leaves open is as large as 4 µm at the markers."""
-WITNESS = JointSettings(bending_share=0.0)
+WITNESS = replace(ON_NODES, bending_share=0.0)
 """To confirm a named indenter. Its dent bends nowhere sharply between two nodes; that doubt would
 hide that something else touches the gel."""

@@ -162,7 +162,6 @@ def unknown_shape(
     reference: NDArray[np.uint8] | None,
     *,
     gel: str = "linear",
-    finer_pressure: bool = False,
     settings: JointSettings | None = None,
     light: LightCalibration | None = None,
     more: Sequence[tuple[Bundle, float]] = (),
@@ -174,7 +173,6 @@ def unknown_shape(
         calibration: Its camera, and its markers at rest.
         reference: (h, w, 3) uint8 picture without contact; None for forces from the markers alone.
         gel: Law of the gel as in `PipelineSettings`.
-        finer_pressure: As in `PipelineSettings`.
         settings: What is assumed; the defaults if None.
         light: The light as built; see `JointSettings.with_light`.
         more: The sensor with more of each uncertain parameter of its gel, and how much more, as
@@ -224,7 +222,7 @@ def unknown_shape(
         relief=None if bare else NodeRelief.of(_traced(bundle), lattice, deep_mm(bundle)),
         deep_mm=math.inf if gel == "linear" else deep_mm(bundle),
         finer=None if finer is None else finer.surface,
-        pressure=finer if finer_pressure else None,
+        pressure=finer if chosen.finer_pressure else None,
     )
     if seen is None:
         estimator = replace(

@@ -56,7 +56,7 @@ def force(
     compensation: option.Compensation = "exact",
     interpolation: option.Interpolation = "sparse",
     gel: option.GelLaw = "linear",
-    finer_pressure: option.FinerPressure = False,
+    finer_pressure: option.FinerPressure = True,
     friction: option.Friction = 1.0,
     drift: option.Drift = "correct",
     drift_px: option.DriftLimit = 0.5,
