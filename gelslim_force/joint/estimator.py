@@ -23,6 +23,7 @@ from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces, SoughtForces
+from gelslim_force.joint.light_rows import LightRows
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows, rms_length
@@ -76,7 +77,7 @@ class JointEstimator:
         youngs_modulus_mpa: Of the gel.
         settings: What is assumed.
         moved: Finds the region where there is no light.
-        off_design: What gel and camera that are not as specified do where there is no light.
+        off_design: What gel and camera that are not as specified do.
         strained: Another law of the gel, from motion (c, 3) to forces (c, 3); None for linear.
         strained_from_mm: Depth from which it is used.
         relief: What the heights of a deep dent do to its light; None without directions of light.
@@ -228,11 +229,7 @@ class JointEstimator:
         if self.moved is None:
             return np.zeros(len(self.points_mm), dtype=bool)
         lateral = self.markers.lateral_motion(frame.markers.positions_px)
-        return self.moved.nodes(lateral, self._noise_mm(frame), self.settings.marker_mm)
-
-    def _noise_mm(self, frame: FrameData) -> Array:
-        """(n,) standard deviation of the markers' places by the noise of the image."""
-        return frame.noise_px * self.markers.mean_mm_per_px
+        return self.moved.nodes(lateral, frame.noise_mm, self.settings.marker_mm)
 
     def _round(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
         """Linearise at the state, and solve."""
@@ -278,7 +275,10 @@ class JointEstimator:
             return FitState(force, motion, data.gain, equations, sought, data.markers, 0.0, data)
         gain, left = light.gain_after(higher, chosen.gain_sigma), light.unexplained(higher)
         height = data.moved_mm[light.nodes, 2] + higher
-        return FitState(force, motion, gain, equations, sought, data.markers, left, data, height)
+        shown = LightRows(light, data.heights, chosen.gain_sigma, data.free)
+        return FitState(
+            force, motion, gain, equations, sought, data.markers, left, data, height, light=shown
+        )
 
     def offset(self, state: FitState) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
@@ -301,8 +301,8 @@ class JointEstimator:
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
         share = chosen.marker_share * rms_length(model[used])
         errors = math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT
-        noise = self._noise_mm(frame)
-        return MarkerRows.of(used, rows, lateral, (model, bent, self.by_height, noise), errors)
+        motion = model, bent, self.by_height, frame.noise_mm
+        return MarkerRows.of(used, rows, lateral, motion, errors)
 
     @cached_property
     def _to_markers(self) -> sparse.csr_array:

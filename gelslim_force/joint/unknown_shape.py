@@ -39,6 +39,7 @@ from gelslim_force.tracking.marker_noise import noise_px
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.compliance.compliance_change import ComplianceChange
 from ifem_export.compliance.finer_response import (
     EndlessLayers,
     finer_response,
@@ -178,7 +179,7 @@ def unknown_shape(
         settings: What is assumed; the defaults if None.
         light: The light as built; see `JointSettings.with_light`.
         more: The sensor with more of each uncertain parameter of its gel, and how much more, as
-            `BuiltGel` has them. Only forces from the markers alone use them.
+            `BuiltGel` has them: what the forces change by these is then in `JointForces.by_gel`.
 
     Returns:
         The source.
@@ -226,12 +227,9 @@ def unknown_shape(
         finer=None if finer is None else finer.surface,
         pressure=finer if finer_pressure else None,
     )
+    estimator = replace(estimator, off_design=_off_design(bundle, estimator, calibration, more))
     if seen is None:
-        estimator = replace(
-            estimator,
-            moved=_moved_region(estimator),
-            off_design=_off_design(estimator, calibration, more),
-        )
+        estimator = replace(estimator, moved=_moved_region(estimator))
     least = chosen.unseen_by_markers if seen is None else chosen.unseen_force
     unseen_n = least * bundle.material.youngs_modulus_mpa
     return UnknownShape(estimator, followed, unseen_n / layer_stiffness_n_mm(bundle))
@@ -259,12 +257,14 @@ def _moved_region(estimator: JointEstimator) -> MovedRegion:
 
 
 def _off_design(
-    estimator: JointEstimator, calibration: Calibration, more: Sequence[tuple[Bundle, float]]
+    bundle: Bundle,
+    estimator: JointEstimator,
+    calibration: Calibration,
+    more: Sequence[tuple[Bundle, float]],
 ) -> OffDesign:
     deviation = calibration.deviation
-    return OffDesign.of(
-        estimator.responses.compliance,
-        more,
+    return OffDesign(
+        ComplianceChange.of(bundle, more) if more else None,
         estimator.nodes_to_markers,
         estimator.by_height,
         0.0 if deviation is None else deviation.lean_sigma_mm_per_mm,
