@@ -109,29 +109,26 @@ class JointEstimator:
     finer: FinerSurface | None = None
     pressure: FinerPressure | None = None
 
-    def estimate(
-        self,
-        image: NDArray[np.uint8],
-        markers_px: Array,
-        noise_px: float,
-        last: JointForces | None = None,
-    ) -> JointForces | None:
-        """Forces of a frame.
+    def frame(self, image: NDArray[np.uint8], markers_px: Array, noise_px: float) -> FrameData:
+        """Data of a frame.
 
         Args:
             image: (h, w, 3) uint8; not looked at without light.
             markers_px: (n, 2) followed markers; NaN for lost ones.
             noise_px: Standard deviation of their positions.
-            last: Forces of the frame before.
 
-        Returns:
-            The forces; None where no contact is seen.
+        Raises:
+            LostColourError: The picture is grey where the rest has colour.
+        """
+        seen = None if self.light is None else self.light.look(image, markers_px)
+        return FrameData(seen, MarkerRays(self.markers, markers_px), noise_px)
+
+    def estimate(self, frame: FrameData, last: JointForces | None = None) -> JointForces | None:
+        """Forces of a frame, after those of the frame before; None where no contact is seen.
 
         Raises:
             IfemError: The strained law does not converge.
         """
-        seen = None if self.light is None else self.light.look(image, markers_px)
-        frame = FrameData(seen, MarkerRays(self.markers, markers_px), noise_px)
         region = self._region(frame)
         if region.sum() < _LEAST_NODES:
             return None

@@ -59,6 +59,11 @@ _UNCERTAIN = (
     "the markers alone show the normal force as {:.2g} N with a standard deviation of {:.2g} N, "
     "which is more than {:.0%} of it: it is unknown"
 )
+_MOST_FAINT = 2.0
+_COARSE = (
+    "the picture is compressed so strongly that its light may hide a contact or a part of one: let "
+    "the camera compress less"
+)
 _MOST_SIGMAS = 4
 _OTHER_GAIN = (
     "the light changes {:.1f} times as much as the contact explains, and more than 1 ± {:.1f} is "
@@ -81,19 +86,20 @@ class UnknownShape:
         self, estimator: JointEstimator, reference: ReferenceLattice, unseen_mm: float = 0.0
     ) -> None:
         self.estimator, self.reference, self.unseen_mm = estimator, reference, unseen_mm
-        self._last: JointForces | None = None
+        self.reset()
 
     def reset(self) -> None:
         """Forget the last frame."""
-        self._last = None
+        self._last: JointForces | None = None
+        self._faint = 1.0
 
     @property
     def unseen_n(self) -> float:
-        """Normal force that the light may not show."""
+        """Normal force that the light of the last frame may not show."""
         chosen = self.estimator.settings
         bare = self.estimator.light is None
         least = chosen.unseen_by_markers if bare else chosen.unseen_force
-        return least * self.estimator.youngs_modulus_mpa
+        return least * self.estimator.youngs_modulus_mpa * self._faint
 
     @property
     def most_gain(self) -> float:
@@ -109,10 +115,14 @@ class UnknownShape:
         noise = noise_px(self.reference, markers_px - self.reference.positions_px)
         last, self._last = self._last, None
         try:
-            found = self.estimator.estimate(image, markers_px, noise, last)
+            frame = self.estimator.frame(image, markers_px, noise)
+            self._faint = 1.0 if frame.seen is None else frame.seen.faint
+            if self._faint > _MOST_FAINT:
+                return _COARSE
+            found = self.estimator.estimate(frame, last)
             if found is not None and last is not None and not self._explains(found):
                 # The frame before was spoiled, or showed another contact.
-                found = self.estimator.estimate(image, markers_px, noise)
+                found = self.estimator.estimate(frame)
         except (IfemError, LostColourError) as error:
             return str(error)
         if found is None or self._explains(found):
@@ -132,7 +142,7 @@ class UnknownShape:
         if isinstance(seen, str):
             return NormalReading.unknown(count, seen)
         if seen is None:
-            return NormalReading.unseen(count, self.unseen_n, self.unseen_mm)
+            return NormalReading.unseen(count, self.unseen_n, self.unseen_mm * self._faint)
         if seen.unexplained > LARGEST_UNEXPLAINED:
             return NormalReading.unknown(count, _UNEXPLAINED.format(seen.unexplained))
         normal_n, most = abs(float(seen.force_n[:, 2].sum())), self.estimator.settings.most_sigma
