@@ -249,7 +249,8 @@ class CorrectedContact:
         """The states found, and those of `NonlinearContact` from where there is none."""
         number = 0
         try:
-            for number, state in enumerate(found, 1):
+            for state in found:
+                number += 1
                 yield state
         except ContactError:
             yield from islice(self._converged(poses), number, None)

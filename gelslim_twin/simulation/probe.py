@@ -30,9 +30,10 @@ from gelslim_twin.contact.prony import PronySeries
 from gelslim_twin.contact.relaxation import at_rest, relax
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.effects.circumstances import MotionFigures, Probed
-from gelslim_twin.effects.contact import RIM_NODES, RIM_PLACES, RelaxationParameters
+from gelslim_twin.effects.contact import RelaxationParameters
 from gelslim_twin.effects.effect import Bound, geometry, picture, rounded_up
 from gelslim_twin.effects.grey_values import MotionBlurParameters
+from gelslim_twin.effects.large_strain import RIM_NODES, RIM_PLACES
 from gelslim_twin.planning.planner import Question
 from gelslim_twin.planning.probing import MOTION_BLUR, probed_poses
 from gelslim_twin.scene.pose import Pose

@@ -18,7 +18,7 @@ from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.effects.contact import CORRECTED_RUNGS, HELD_AT, corrected_error
+from gelslim_twin.effects.large_strain import CORRECTED_RUNGS, HELD_AT, corrected_error
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.probe import probed

@@ -11,9 +11,10 @@ import pytest
 from effect_samples import BOUND, FIGURES, LADDER, MOTION, ball, circumstances, values
 
 from gelslim_twin.effects.circumstances import MotionFigures, Probed, SensorFigures
-from gelslim_twin.effects.contact import CORRECTED_RUNGS, HELD_AT, corrected_error, moved_mm
+from gelslim_twin.effects.contact import moved_mm
 from gelslim_twin.effects.effect import Bound, Rung, geometry, optics, picture
 from gelslim_twin.effects.grey_values import MotionBlurParameters, ShadingParameters, grey_share
+from gelslim_twin.effects.large_strain import CORRECTED_RUNGS, HELD_AT, corrected_error
 
 REFERENCE = replace(
     FIGURES,

@@ -15,10 +15,10 @@ from scene_samples import GALLERY, SENSOR
 
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.effects.circumstances import PictureSizes
-from gelslim_twin.effects.contact import convergence_ms
 from gelslim_twin.effects.dot_contrast import shift_px
 from gelslim_twin.effects.effect import OBSERVABLES, rounded_up
 from gelslim_twin.effects.grey_values import MotionBlurParameters, smear_px
+from gelslim_twin.effects.large_strain import convergence_ms
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.probing import (

@@ -16,7 +16,7 @@ from gelslim_twin.contact.corrected_contact import CorrectedContact
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.effects.contact import convergence_ms
+from gelslim_twin.effects.large_strain import convergence_ms
 from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.probing import MOST_POSES, MOST_SHARE, effects_to_probe, probed_poses
 from gelslim_twin.planning.question import bundle_figures, question
