@@ -50,7 +50,7 @@ TIMES_MS = {
     "dirt": (0.01,),
     "defocus": (1.5,),
     "specular": (0.3,),
-    "motion_blur": (1.2, 1.4, 1.8, 2.6, 4.2),
+    "motion_blur": (1.2, 1.4, 1.8, 2.6, 4.2, 7.4),
     "exposure": (0.4,),
     "sensor_noise": (1.5,),
     "compression": (2.0,),
@@ -273,7 +273,7 @@ def smeared() -> Iterator[tuple[float, Rung, float]]:
             motion=replace(MOTION, speed_mm_s=speed_mm_s),
             motion_blur=MotionBlurParameters(shutter_ms=8.0),
         )
-        smear_px = speed_mm_s * 0.008 * FIGURES.px_per_mm
+        smear_px = 1.5 * speed_mm_s * 0.008 * FIGURES.px_per_mm
         assert BOUND["motion_blur"](c) == picture(pytest.approx(smear_px / 2))
         for rung in LADDER["motion_blur"](c):
             yield smear_px, rung, math.hypot(1.0, c.blur_px)
@@ -294,7 +294,14 @@ def test_n_instants_of_a_smear_lack_the_second_moment_of_a_step() -> None:
     for n in (2, 4, 8, 16, 32):
         middles = (np.arange(n) + 0.5) / n
         assert 1 / 12 - middles.var() == pytest.approx((1 / n) ** 2 / 12)
-    assert [r.parameters["most_poses"] for r in LADDER["motion_blur"](APART)] == [2, 4, 8, 16, 32]
+    assert [r.parameters["most_poses"] for r in LADDER["motion_blur"](APART)] == [
+        2,
+        4,
+        8,
+        16,
+        32,
+        64,
+    ]
 
 
 def test_exact_rungs_have_no_error() -> None:
