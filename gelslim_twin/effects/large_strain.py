@@ -61,7 +61,7 @@ one; at 0.02 a node was held in one and free in the other in two deep presses an
 slide, in two of 13 random scenes."""
 SLIDING_PLACES = 4.0
 """`CORRECTED_PLACES` where walls slide and every path with a pose that cannot be corrected is
-converged: nodes slip a little earlier or later whatever the tolerance. The 55 other ones of 76
+converged: nodes slip a little earlier or later whatever the tolerance. The 55 other ones of 68
 random scenes reach 1.8 at `HELD_AT`."""
 RIM_NODES, RIM_PLACES = 2, 2.0
 """Nodes that a sliding wall of the tool may hold on one gel and not on the other: their whole force
