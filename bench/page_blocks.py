@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.bench_data import DOCS, ROOT, write_whole
-from bench.force import force_sigma
+from bench.force import compressed_pictures, force_sigma
 from bench.learning import data_set_cost, learned_forces, real_locations
 from bench.page import (
     drawn_light_table,
@@ -67,6 +67,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "ladders": _from("force_ladders", force_tables.ladder_tables),
         "large-strain": _from("force_ladders", page_tables.large_strain),
         "sigma": _from("force_sigma", force_sigma.table),
+        "compressed-pictures": _from("compressed_pictures", compressed_pictures.table),
         "mitsuba-forces": _from("mitsuba_forces", mitsuba_scores.table),
     },
     "docs/digital_twin.md": {

@@ -44,6 +44,7 @@ STEPS = (
     Step("force.force_ladders"),
     Step("force.normal_sources"),
     Step("force.force_sigma", quick=None),
+    Step("force.compressed_pictures", quick=None),
     Step("twin.twin_ladders"),
     Step("twin.twin_planning"),
     Step("twin.twin_steps"),

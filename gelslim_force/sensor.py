@@ -179,7 +179,7 @@ def normal_source(
             "keeps none: give the reference picture too, or calibrate again",
         )
     if indenter is None or indenter == UNKNOWN:
-        return unknown_source(bundle, calibration, picture, settings, light)
+        return unknown_source(bundle, calibration, picture, settings, light, sensor.more)
     named = indenter_source(bundle, calibration, picture, indenter, depth_mm, settings)
     named = sensor.varied(named, settings)
     checked = (settings or PipelineSettings()).check_indenter

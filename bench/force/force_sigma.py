@@ -3,6 +3,7 @@
     python -m bench.force.force_sigma              # 200 contacts of each mode
     python -m bench.force.force_sigma --processes 8
     python -m bench.force.force_sigma --deep       # the deep contacts only; the rest is kept
+    python -m bench.force.force_sigma --wide       # only gels whose Poisson's ratio is hardly known
     python -m bench.force.force_sigma --figure     # draw the figure from the data again
 
 Writes docs/data/force_sigma.json and docs/images/force_sigma.png. Contacts and the scores of each
@@ -47,17 +48,15 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=200, help="contacts of each mode")
     parser.add_argument("--kept", type=Path, default=KEPT, help="folder for contacts and slices")
     parser.add_argument("--deep", action="store_true", help="score the deep contacts only")
+    parser.add_argument("--wide", action="store_true", help="score only the gels of that name")
     parser.add_argument("--processes", type=int, default=1, help="that share the contacts")
     parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder like docs")
     options = parser.parse_args()
+    _see_tests()
     stored = options.docs / "data" / "force_sigma.json"
     if not options.figure:
-        if options.deep:
-            data = json.loads(stored.read_text("utf-8"))
-        else:
-            data = {**machine(31), "cases": options.cases, "modes": scored(options)}
-        data["deep"] = deep_scored(options.processes)
+        data = measured(options, stored)
         write_data("force_sigma", data, options.docs)
     record = json.loads(stored.read_text("utf-8"))
     panels = {**record["modes"], "nothing given, deep": {"auto": record["deep"]["auto"]}}
@@ -65,12 +64,29 @@ def main() -> None:
     print(table(record))
 
 
+def measured(options: argparse.Namespace, stored: Path) -> dict[str, Any]:
+    """All scores; those that are not asked for are the stored ones."""
+    from sigma_gate import MODES, WIDE
+
+    data: dict[str, Any] = {}
+    if options.deep or options.wide:
+        data = json.loads(stored.read_text("utf-8"))
+    else:
+        data = {**machine(31), "cases": options.cases, "modes": scored(options, MODES)}
+    if options.wide or not options.deep:
+        data["wide"] = scored(options, (WIDE,))[WIDE]
+    if options.deep or not options.wide:
+        data["deep"] = deep_scored(options.processes)
+    return data
+
+
 @dataclass(frozen=True)
 class Slice:
-    """Contacts that one process scores in all modes, with the folder for contacts and scores."""
+    """Contacts that one process scores in some modes, with the folder for contacts and scores."""
 
     seeds: range
     kept: Path
+    modes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -81,24 +97,22 @@ class DeepSlice:
     seeds: range
 
 
-def scored(options: argparse.Namespace) -> dict[str, Any]:
+def scored(options: argparse.Namespace, modes: tuple[str, ...]) -> dict[str, Any]:
     """Scores, median errors and deviations by mode and condition."""
-    _see_tests()
     from sigma_cases import CONDITIONS
-    from sigma_gate import MODES
 
     options.kept.mkdir(parents=True, exist_ok=True)
     slices = [
-        Slice(range(first, min(first + SLICE, options.cases)), options.kept)
+        Slice(range(first, min(first + SLICE, options.cases)), options.kept, modes)
         for first in range(0, options.cases, SLICE)
     ]
     for number, _ in Engine(options.processes).run(score_slice, slices):
         print(slices[number].seeds, flush=True)
     rows: dict[str, dict[str, list[Record]]] = {
-        mode: {condition: [] for condition in CONDITIONS} for mode in MODES
+        mode: {condition: [] for condition in CONDITIONS} for mode in modes
     }
     for some in slices:
-        for mode in MODES:
+        for mode in modes:
             for name, every in json.loads(_path(some, mode).read_text("utf-8")).items():
                 rows[mode][name] += every
     return {
@@ -110,9 +124,9 @@ def scored(options: argparse.Namespace) -> dict[str, Any]:
 def score_slice(some: Slice) -> None:
     """Write the scores of a slice, mode by mode, where they are not kept."""
     _see_tests()
-    from sigma_gate import MODES, scores
+    from sigma_gate import scores
 
-    for mode in MODES:
+    for mode in some.modes:
         if not _path(some, mode).exists():
             found = scores(mode, some.seeds, some.kept)
             plain = {name: [vars(s) for s in every] for name, every in found.items()}
@@ -120,12 +134,14 @@ def score_slice(some: Slice) -> None:
 
 
 def _path(some: Slice, mode: str) -> Path:
-    return some.kept / f"{mode.split()[0]}-{some.seeds.start}-{some.seeds.stop}.json"
+    from sigma_gate import WIDE
+
+    name = "wide" if mode == WIDE else mode.split()[0]
+    return some.kept / f"{name}-{some.seeds.start}-{some.seeds.stop}.json"
 
 
 def deep_scored(processes: int) -> dict[str, Any]:
     """Scores and relative errors of the deep contacts by law of the gel; nothing is given."""
-    _see_tests()
     from deep_contacts import COUNT, SEEN
     from deep_gate import LAWS, deep_summary
 
@@ -191,6 +207,9 @@ def table(record: Record) -> str:
         every = list(conditions.values())
         lines += [_row(f"{mode}, {name}", [row]) for name, row in conditions.items()]
         lines.append(_row(f"**{mode}, all**", every))
+    if "wide" in record:
+        every = list(record["wide"].values())
+        lines.append(_row("nothing given, Poisson's ratio ± 0.02, all", every))
     lines += [_row(f"nothing given, deep, gel {law}", [row]) for law, row in record["deep"].items()]
     return "\n".join(lines)
 

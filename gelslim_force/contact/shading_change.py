@@ -18,6 +18,7 @@ from scipy.ndimage import binary_dilation
 
 from gelslim_core.errors import GelslimError
 from gelslim_force.contact.light_baseline import without_baseline
+from gelslim_force.contact.noise_grain import noise_grain
 from gelslim_force.contact.reflections import reflecting
 from gelslim_force.frames.read_only import read_only
 
@@ -53,9 +54,12 @@ class ShadingChange:
     """(rows, columns) bins on the pad with enough free pixels."""
     noise: NDArray[np.floating]
     """(c, rows, columns) standard deviation of each bin, from the spread outside the patch; it is
-    larger where there is little light, or few free pixels."""
+    larger where there is little light, or few free pixels, and by `grain`."""
     hidden: Mask | None = None
     """(rows, columns) bins on the pad that a reflection hides; None without one."""
+    grain: Array | None = None
+    """(c,) the noise over that of a single bin: with it means over many bins hold, also where bins
+    share their errors as in compressed pictures; see `noise_grain`. None for 1."""
 
 
 class ShadingReference:
@@ -163,11 +167,13 @@ class ShadingReference:
         noise_level = self._noise_level * self._by_free[self._counts]
         change, valid = _combined(np.log(self._ratios[self.used])), free & self.on_pad
         noise = without_baseline(change, valid, noise_level)
+        grain = noise_grain(change, noise, valid, self.bin_px)
+        noise *= grain.astype(noise.dtype)[:, None, None]
         hidden = reflecting(change, noise, valid) if self._opposed and len(change) > 1 else None
         if hidden is None or not hidden.any():
-            return ShadingChange(change, valid, noise)
+            return ShadingChange(change, valid, noise, grain=grain)
         change *= ~hidden
-        return ShadingChange(change, valid & ~hidden, noise, hidden & self.on_pad)
+        return ShadingChange(change, valid & ~hidden, noise, hidden & self.on_pad, grain)
 
     def _soiled(self) -> Mask:
         """(rows, columns) bins that something opaque covers, and those beside them.

@@ -23,6 +23,7 @@ from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces, SoughtForces
+from gelslim_force.joint.light_rows import LightRows
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows, rms_length
@@ -77,7 +78,7 @@ class JointEstimator:
         youngs_modulus_mpa: Of the gel.
         settings: What is assumed.
         moved: Finds the region where there is no light.
-        off_design: What gel and camera that are not as specified do where there is no light.
+        off_design: What gel and camera that are not as specified do.
         strained: Another law of the gel, from motion (c, 3) to forces (c, 3); None for linear.
         strained_from_mm: Depth from which it is used.
         relief: What the heights of a deep dent do to its light; None without directions of light.
@@ -109,29 +110,26 @@ class JointEstimator:
     finer: FinerSurface | None = None
     pressure: FinerPressure | None = None
 
-    def estimate(
-        self,
-        image: NDArray[np.uint8],
-        markers_px: Array,
-        noise_px: float,
-        last: JointForces | None = None,
-    ) -> JointForces | None:
-        """Forces of a frame.
+    def frame(self, image: NDArray[np.uint8], markers_px: Array, noise_px: float) -> FrameData:
+        """Data of a frame.
 
         Args:
             image: (h, w, 3) uint8; not looked at without light.
             markers_px: (n, 2) followed markers; NaN for lost ones.
             noise_px: Standard deviation of their positions.
-            last: Forces of the frame before.
 
-        Returns:
-            The forces; None where no contact is seen.
+        Raises:
+            LostColourError: The picture is grey where the rest has colour.
+        """
+        seen = None if self.light is None else self.light.look(image, markers_px)
+        return FrameData(seen, MarkerRays(self.markers, markers_px), noise_px)
+
+    def estimate(self, frame: FrameData, last: JointForces | None = None) -> JointForces | None:
+        """Forces of a frame, after those of the frame before; None where no contact is seen.
 
         Raises:
             IfemError: The strained law does not converge.
         """
-        seen = None if self.light is None else self.light.look(image, markers_px)
-        frame = FrameData(seen, MarkerRays(self.markers, markers_px), noise_px)
         region = self._region(frame)
         if region.sum() < _LEAST_NODES:
             return None
@@ -232,11 +230,7 @@ class JointEstimator:
         if self.moved is None:
             return np.zeros(len(self.points_mm), dtype=bool)
         lateral = self.markers.lateral_motion(frame.markers.positions_px)
-        return self.moved.nodes(lateral, self._noise_mm(frame), self.settings.marker_mm)
-
-    def _noise_mm(self, frame: FrameData) -> Array:
-        """(n,) standard deviation of the markers' places by the noise of the image."""
-        return frame.noise_px * self.markers.mean_mm_per_px
+        return self.moved.nodes(lateral, frame.noise_mm, self.settings.marker_mm)
 
     def _round(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
         """Linearise at the state, and solve."""
@@ -282,7 +276,10 @@ class JointEstimator:
             return FitState(force, motion, data.gain, equations, sought, data.markers, 0.0, data)
         gain, left = light.gain_after(higher, chosen.gain_sigma), light.unexplained(higher)
         height = data.moved_mm[light.nodes, 2] + higher
-        return FitState(force, motion, gain, equations, sought, data.markers, left, data, height)
+        shown = LightRows(light, data.heights, chosen.gain_sigma, data.free)
+        return FitState(
+            force, motion, gain, equations, sought, data.markers, left, data, height, light=shown
+        )
 
     def offset(self, state: FitState) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
@@ -305,8 +302,8 @@ class JointEstimator:
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
         share = chosen.marker_share * rms_length(model[used])
         errors = math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT
-        noise = self._noise_mm(frame)
-        return MarkerRows.of(used, rows, lateral, (model, bent, self.by_height, noise), errors)
+        motion = model, bent, self.by_height, frame.noise_mm
+        return MarkerRows.of(used, rows, lateral, motion, errors)
 
     @cached_property
     def _to_markers(self) -> sparse.csr_array:

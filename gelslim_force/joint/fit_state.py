@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.joint.light_rows import LightRows
 from gelslim_force.joint.light_view import SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows
 from gelslim_force.joint.normal_equations import Linearised, NormalEquations
@@ -31,6 +32,11 @@ class FrameData:
     seen: SeenLight | None
     markers: MarkerRays
     noise_px: float
+
+    @property
+    def noise_mm(self) -> Array:
+        """(n,) standard deviation of the markers' places by the noise of the image."""
+        return np.asarray(self.noise_px * self.markers.view.mean_mm_per_px)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +99,7 @@ class FitState:
         data: Linear data that it solves; None for a start.
         height_mm: (m,) of the nodes in and around the contact; None where all have to be looked at.
         wider_n: (c, 3) forces before the last nodes were removed; None where none were.
+        light: Data of the light that it explains; None without light and for a start.
     """
 
     force_n: Array
@@ -105,6 +112,7 @@ class FitState:
     data: Linearised | None = None
     height_mm: Array | None = None
     wider_n: Array | None = None
+    light: LightRows | None = None
 
     @property
     def displacement_mm(self) -> Array:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from gelslim_force.joint.deepness import roughness_mpa
 from gelslim_force.joint.finer_pressure import FinerPressure, PressureParts
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, SoughtForces
+from gelslim_force.joint.light_rows import LightRows
 from gelslim_force.joint.normal_equations import STEPS, NormalEquations
 
 if TYPE_CHECKING:
@@ -96,6 +97,7 @@ class _Refinement:
             self._sought(found, force),
             markers.after(found - before),
             state.unexplained,
+            light=LightRows(light, heights, gain[1], None, pressure.surface.interpolation),
         )
 
     def _before(self, state: FitState) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
 from gelslim_force.contact.shading_change import ShadingChange
-from gelslim_force.joint.morphology import closed, filled, opened
+from gelslim_force.joint.morphology import closed, filled, opened, widened
 from gelslim_force.joint.node_lattice import NodeLattice
 
 Array = NDArray[np.float64]
@@ -24,6 +24,10 @@ LEAST_POWER = 6.0
 """Smallest squared change over the noise, averaged over 3 x 3 bins."""
 LEAST_VALID = 0.2
 """Share of the 3 x 3 bins that must be valid."""
+_WIDE, _LEAST_WIDE_POWER, _RIM = 7, 20.0, 3
+"""Bins along the side of a square whose mean change is looked at where errors reach over several
+bins, its smallest square over the noise, averaged over two layers, and steps beyond such bins to
+the rim of a contact, where it is smaller."""
 _CLOSED, _OPENED = 4, 1
 """Steps by which gaps, such as dots, are closed, and by which specks are removed."""
 _LEAST_ACROSS = 0.1
@@ -140,6 +144,8 @@ def changed_bins(shading: ShadingChange) -> Mask:
     """
     from gelslim_force.joint.region_kernel import bins_above_noise
 
+    if shading.grain is not None and shading.grain[:2].max() > 1:
+        return _whole(widened(opened(_changed_widely(shading), _OPENED), _RIM))
     changed, box = np.empty(shading.valid.shape, dtype=bool), np.empty(4, dtype=np.intp)
     noise, valid = shading.noise[:2], shading.valid
     bins_above_noise(shading.change[:2], noise, valid, LEAST_POWER, LEAST_VALID, changed, box)
@@ -148,6 +154,25 @@ def changed_bins(shading: ShadingChange) -> Mask:
     if top < bottom:
         found[top:bottom, left:right] = _whole(changed[top:bottom, left:right])
     return found
+
+
+def _changed_widely(shading: ShadingChange) -> Mask:
+    """Bins around which the light changed on average, with errors that reach over several bins.
+
+    Squares of single bins hardly tell a contact from such errors. A contact changes the light over
+    more than a millimetre to the same side, which a mean over that shows much better.
+    """
+    valid = shading.valid.astype(np.float32)
+
+    def mean(values: NDArray[np.floating]) -> NDArray[np.floating]:
+        return np.asarray(ndimage.uniform_filter(values, _WIDE, mode="constant"))
+
+    layers = shading.change[:2]
+    power = np.zeros(valid.shape, dtype=np.float32)
+    for change, noise in zip(layers, shading.noise[:2], strict=True):
+        variance = mean(valid * np.square(np.where(shading.valid, noise, 0))) / _WIDE**2
+        power += np.square(mean(valid * change)) / np.maximum(variance, 1e-12)
+    return np.asarray((power > _LEAST_WIDE_POWER * len(layers)) & (mean(valid) > LEAST_VALID))
 
 
 def _whole(changed: Mask) -> Mask:

@@ -39,6 +39,7 @@ from gelslim_force.tracking.marker_noise import noise_px
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.compliance.compliance_change import ComplianceChange
 from ifem_export.compliance.finer_response import (
     EndlessLayers,
     finer_response,
@@ -57,6 +58,11 @@ _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the lig
 _UNCERTAIN = (
     "the markers alone show the normal force as {:.2g} N with a standard deviation of {:.2g} N, "
     "which is more than {:.0%} of it: it is unknown"
+)
+_MOST_FAINT = 2.0
+_COARSE = (
+    "the picture is compressed so strongly that its light may hide a contact or a part of one: let "
+    "the camera compress less"
 )
 _MOST_SIGMAS = 4
 _OTHER_GAIN = (
@@ -80,19 +86,20 @@ class UnknownShape:
         self, estimator: JointEstimator, reference: ReferenceLattice, unseen_mm: float = 0.0
     ) -> None:
         self.estimator, self.reference, self.unseen_mm = estimator, reference, unseen_mm
-        self._last: JointForces | None = None
+        self.reset()
 
     def reset(self) -> None:
         """Forget the last frame."""
-        self._last = None
+        self._last: JointForces | None = None
+        self._faint = 1.0
 
     @property
     def unseen_n(self) -> float:
-        """Normal force that the light may not show."""
+        """Normal force that the light of the last frame may not show."""
         chosen = self.estimator.settings
         bare = self.estimator.light is None
         least = chosen.unseen_by_markers if bare else chosen.unseen_force
-        return least * self.estimator.youngs_modulus_mpa
+        return least * self.estimator.youngs_modulus_mpa * self._faint
 
     @property
     def most_gain(self) -> float:
@@ -108,10 +115,14 @@ class UnknownShape:
         noise = noise_px(self.reference, markers_px - self.reference.positions_px)
         last, self._last = self._last, None
         try:
-            found = self.estimator.estimate(image, markers_px, noise, last)
+            frame = self.estimator.frame(image, markers_px, noise)
+            self._faint = 1.0 if frame.seen is None else frame.seen.faint
+            if self._faint > _MOST_FAINT:
+                return _COARSE
+            found = self.estimator.estimate(frame, last)
             if found is not None and last is not None and not self._explains(found):
                 # The frame before was spoiled, or showed another contact.
-                found = self.estimator.estimate(image, markers_px, noise)
+                found = self.estimator.estimate(frame)
         except (IfemError, LostColourError) as error:
             return str(error)
         if found is None or self._explains(found):
@@ -131,7 +142,7 @@ class UnknownShape:
         if isinstance(seen, str):
             return NormalReading.unknown(count, seen)
         if seen is None:
-            return NormalReading.unseen(count, self.unseen_n, self.unseen_mm)
+            return NormalReading.unseen(count, self.unseen_n, self.unseen_mm * self._faint)
         if seen.unexplained > LARGEST_UNEXPLAINED:
             return NormalReading.unknown(count, _UNEXPLAINED.format(seen.unexplained))
         normal_n, most = abs(float(seen.force_n[:, 2].sum())), self.estimator.settings.most_sigma
@@ -176,7 +187,7 @@ def unknown_shape(
         settings: What is assumed; the defaults if None.
         light: The light as built; see `JointSettings.with_light`.
         more: The sensor with more of each uncertain parameter of its gel, and how much more, as
-            `BuiltGel` has them. Only forces from the markers alone use them.
+            `BuiltGel` has them: what the forces change by these is then in `JointForces.by_gel`.
 
     Returns:
         The source.
@@ -224,12 +235,9 @@ def unknown_shape(
         finer=None if finer is None else finer.surface,
         pressure=finer if chosen.finer_pressure else None,
     )
+    estimator = replace(estimator, off_design=_off_design(bundle, estimator, calibration, more))
     if seen is None:
-        estimator = replace(
-            estimator,
-            moved=_moved_region(estimator),
-            off_design=_off_design(estimator, calibration, more),
-        )
+        estimator = replace(estimator, moved=_moved_region(estimator))
     least = chosen.unseen_by_markers if seen is None else chosen.unseen_force
     unseen_n = least * bundle.material.youngs_modulus_mpa
     return UnknownShape(estimator, followed, unseen_n / layer_stiffness_n_mm(bundle))
@@ -257,12 +265,14 @@ def _moved_region(estimator: JointEstimator) -> MovedRegion:
 
 
 def _off_design(
-    estimator: JointEstimator, calibration: Calibration, more: Sequence[tuple[Bundle, float]]
+    bundle: Bundle,
+    estimator: JointEstimator,
+    calibration: Calibration,
+    more: Sequence[tuple[Bundle, float]],
 ) -> OffDesign:
     deviation = calibration.deviation
-    return OffDesign.of(
-        estimator.responses.compliance,
-        more,
+    return OffDesign(
+        ComplianceChange.of(bundle, more) if more else None,
         estimator.nodes_to_markers,
         estimator.by_height,
         0.0 if deviation is None else deviation.lean_sigma_mm_per_mm,

@@ -5,9 +5,9 @@ logarithm of the modulus is W. The derivatives of G S by thickness and by Poisso
 differences of the adjoint fields of two pads, computed once; where the normal motion follows from
 the size of a patch, it depends on the gel too, and its derivative adds G S du/dh. A skin has no
 part in G S, because its forces are in balance, but the normal motion depends on its stiffness over
-the modulus. Where the forces follow from the markers alone, the source gives their derivatives
-(`joint.off_design`). A linear law leaves out a part of the force that grows with the depth
-(docs/physics.md, "Modulus").
+the modulus. The motion of an object of unknown shape is not given, but follows from its forces with
+the gel: there the source gives the derivatives of these (`joint.off_design`). A linear law leaves
+out a part of the force that grows with the depth (docs/physics.md, "Modulus").
 """
 
 from __future__ import annotations

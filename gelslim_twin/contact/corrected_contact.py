@@ -202,7 +202,7 @@ class CorrectedContact:
     """Solves the contact along a sequence of poses, like `ContactSolver`, on a neo-Hookean gel.
 
     From a pose on where corrections do not converge, for example because the displacement inverts
-    a cell, the states are those of `NonlinearContact`.
+    a cell, the states are those of `NonlinearContact`; with `restarts` those of all poses are.
     """
 
     solver: ContactSolver
@@ -211,6 +211,10 @@ class CorrectedContact:
     by_rate: bool = True
     """Whether what a correction leaves follows from the rate at which they become smaller. For a
     tool with walls it should not: which nodes a wall holds takes corrections to spare."""
+    restarts: bool = False
+    """Whether a path of which one pose cannot be corrected is converged from its first pose on, so
+    that the states come once all are found. The poses before it are the hardest for corrections:
+    sliding walls then hold other nodes."""
 
     def __post_init__(self) -> None:
         """Raises ContactError for a pad to which the neo-Hookean law does not apply."""
@@ -218,7 +222,7 @@ class CorrectedContact:
         if problem is not None:
             raise ContactError("; ".join(problem))
         law = min(LAW_TOLERANCE, LAW_SHARE * self.tolerance)
-        settings = self.solver.settings
+        settings = self._asked = self.solver.settings
         most = (CONTACT_SHARE * self.tolerance) ** 2
         self.solver.settings = replace(settings, tolerance=min(settings.tolerance, most))
         self._correction = Correction(self.solver.compliance.bundle, law)
@@ -227,29 +231,51 @@ class CorrectedContact:
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
         """A state per pose, starting from the undeformed gel. Raises ContactError."""
+        found = self._along(poses)
+        if not self.restarts:
+            yield from self._or_converged(found, poses)
+            return
+        try:
+            states = [*found]
+        except ContactError:
+            self.solver.settings = self._asked
+            yield from self._converged(poses)
+        else:
+            yield from states
+
+    def _or_converged(
+        self, found: Iterator[GelState], poses: tuple[Pose, ...]
+    ) -> Iterator[GelState]:
+        """The states found, and those of `NonlinearContact` from where there is none."""
+        number = 0
+        try:
+            for state in found:
+                number += 1
+                yield state
+        except ContactError:
+            yield from islice(self._converged(poses), number, None)
+
+    def _along(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
+        """A state per pose. Raises ContactError for the first that cannot be corrected."""
         state = GelState.at_rest(len(self._none))
         before: Pose | None = None
         self._most_mm = self._most_n = 0.0
         self._restart()
-        for number, pose in enumerate(poses):
+        for pose in poses:
             if before is None or not is_stationary(before, pose):
-                try:
-                    state = self._corrected(state, before, pose)
-                except ContactError:
-                    yield from self._converged(poses, number)
-                    return
+                state = self._corrected(state, before, pose)
             before = pose
             yield GelState(state.displacement_mm, state.force_n, state.touch, state.solver)
         self.solver.compliance.store()
 
-    def _converged(self, poses: tuple[Pose, ...], number: int) -> Iterator[GelState]:
-        """The states from pose `number` on by `NonlinearContact`.
+    def _converged(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
+        """The states by `NonlinearContact`.
 
-        It starts at the first pose: which nodes a sliding wall holds depends on the path.
+        They start at the first pose: which nodes a sliding wall holds depends on the path.
         """
         self.solver.candidates = Candidates.none()
         tolerance = min(CONVERGED, CONVERGED_SHARE * self.tolerance)
-        return islice(NonlinearContact(self.solver, tolerance).states(poses), number, None)
+        return NonlinearContact(self.solver, tolerance).states(poses)
 
     def _restart(self) -> None:
         """Start from a gel at rest, of which only is known that it needs a correction."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gelslim_twin.effects.adhesion import ADHESION
-from gelslim_twin.effects.contact import FRICTION, NONLINEARITY, NORMAL_CONTACT, RELAXATION
+from gelslim_twin.effects.contact import FRICTION, NORMAL_CONTACT, RELAXATION
 from gelslim_twin.effects.dot_contrast import DEFOCUS, DRAWING, EXPOSURE
 from gelslim_twin.effects.dot_positions import (
     LENS_DISTORTION,
@@ -20,6 +20,7 @@ from gelslim_twin.effects.grey_values import (
     SHADING,
     SPECULAR,
 )
+from gelslim_twin.effects.large_strain import NONLINEARITY
 from gelslim_twin.effects.skin import SKIN
 from gelslim_twin.effects.sliding_friction import SLIDING_FRICTION
 from gelslim_twin.effects.viscoelasticity import VISCOELASTICITY

@@ -231,7 +231,7 @@ def _with_leftover_spent(
     decided: dict[str, Choice],
 ) -> dict[str, Choice]:
     """The decisions with what is left of the tolerance spent on savings of time."""
-    cheaper, counted = {}, dict(decided)
+    others, counted = {}, dict(decided)
     allowed = {o: question.tolerance(o) for o in question.observe}
     for effect in relevant:
         choice, use = decided[effect.name], question.use(effect)
@@ -239,15 +239,19 @@ def _with_leftover_spent(
             # What a scene switches off may err by more than all others together.
             within = choice.error.at_most(Bound.by_observable(shares))
             counted[effect.name] = replace(choice, error=within)
-        if not choice.included:
+        has_room = use == "auto" and choice.saved_ms > 0 and effect.name not in question.left_out
+        if not (choice.included or has_room):
             continue
         _, ladder = question.weighed(effect)
-        others = [_choice(question, effect, choice.why, shares, (rung,)) for rung in ladder]
+        why = choice.why if choice.included else "saves more elsewhere"
+        others[effect.name] = [_choice(question, effect, why, shares, (r,)) for r in ladder]
         if use == "auto" and not effect.provides:
-            others.append(_choice(question, effect, "within what others leave", shares))
-        cheaper[effect.name] = others
-    found = with_leftover_spent(counted, cheaper, allowed)
-    return {name: found[name] if name in cheaper else choice for name, choice in decided.items()}
+            absent = _choice(question, effect, "within what others leave", shares)
+            others[effect.name].append(absent)
+    # What is probed follows from a plan by bounds, in which each effect has its own share.
+    is_known = question.circumstances.probed is not None
+    found = with_leftover_spent(counted, others, allowed, exchanges=is_known)
+    return {name: found[name] if name in others else choice for name, choice in decided.items()}
 
 
 def _excess(error: float, share: float) -> float:

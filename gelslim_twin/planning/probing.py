@@ -11,9 +11,9 @@ import math
 from collections.abc import Sequence
 
 from gelslim_twin.effects.circumstances import Circumstances
-from gelslim_twin.effects.contact import convergence_ms, correction_ms
 from gelslim_twin.effects.effect import Rung
 from gelslim_twin.effects.grey_values import shading_ladder
+from gelslim_twin.effects.large_strain import convergence_ms, correction_ms
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Choice, Plan
 from gelslim_twin.planning.planner import Question

@@ -20,13 +20,14 @@ from gelslim_twin.contact.solver import (
     geometry_of,
 )
 from gelslim_twin.effects.circumstances import EffectParameters
-from gelslim_twin.effects.contact import NEWTON_RUNGS, RelaxationParameters
+from gelslim_twin.effects.contact import RelaxationParameters
 from gelslim_twin.effects.contact_estimate import (
     DEEPEST_SHARE,
     ContactEstimate,
     Footprint,
     contact_estimate,
 )
+from gelslim_twin.effects.large_strain import NEWTON_RUNGS
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.placement import Placement

@@ -50,10 +50,10 @@ class DeepScore:
 def _pipeline(designed_ratio: float, law: str, light: Light) -> ForcePipeline:
     bundle, calibration = deep_bundle(designed_ratio, light), deep_calibration()
     settings = PipelineSettings(gel=law)  # type: ignore[arg-type]
-    share = built_gel(bundle, calibration, None, settings).share
+    gel = built_gel(bundle, calibration, None, settings)
     picture, linear = reference().image, JointSettings(gamma=1.0)
-    source = unknown_shape(bundle, calibration, picture, gel=law, settings=linear)
-    return ForcePipeline(bundle, calibration, settings, source, share)
+    source = unknown_shape(bundle, calibration, picture, gel=law, settings=linear, more=gel.more)
+    return ForcePipeline(bundle, calibration, settings, source, gel.share)
 
 
 def deep_scores(law: str, seeds: Iterable[int], light: Light = "guided") -> tuple[DeepScore, ...]:

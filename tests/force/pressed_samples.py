@@ -9,7 +9,7 @@ ambient light, red from -y, green from +y and blue from the tip.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from camera_rig import off_centre_view
@@ -102,7 +102,7 @@ class FinePad:
         return float(np.prod(self.mesh.cell_size_mm[:2]))
 
 
-@cache
+@lru_cache(maxsize=32)
 def fine_pad(thickness: float = 1.0, poissons_ratio: float | None = None) -> FinePad:
     """Half the pitch and eight layers, with a thickness relative to the design."""
     gel = sensor_bundle().material

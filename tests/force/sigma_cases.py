@@ -35,6 +35,8 @@ LIGHT_GAIN = 0.2
 RADII_MM = (4.0, 5.0, 6.35, 8.0)
 MODULUS_SIGMA, _THICKNESS, _RATIO = 0.03, 0.015, 0.004
 """Standard deviations: of modulus and thickness relative to the design, of Poisson's ratio."""
+WIDE_RATIO = 0.02
+"""That of Poisson's ratio where its maker states no more than two digits."""
 _STEPS = np.array([-1.47, -0.6, 0.0, 0.6, 1.47])
 """Deviations of unit variance: few, so that a pad of the truth serves many cases."""
 _STEP_MM = 0.01
@@ -47,17 +49,17 @@ and the distance from the middle of the picture at which scale and rotation caus
 
 
 @cache
-def specified_bundle() -> Bundle:
-    """The sensor as designed, with the tolerances of its gel."""
-    return with_tolerances(lit_bundle())
+def specified_bundle(wide: bool = False) -> Bundle:
+    """The sensor as designed, with the tolerances of its gel; see `MadeGel.drawn`."""
+    return with_tolerances(lit_bundle(), WIDE_RATIO if wide else _RATIO)
 
 
-def with_tolerances(bundle: Bundle) -> Bundle:
+def with_tolerances(bundle: Bundle, ratio: float = _RATIO) -> Bundle:
     """A sensor with the tolerances within which gels are drawn."""
     tolerances = {
         "youngs_modulus_mpa": MODULUS_SIGMA * bundle.material.youngs_modulus_mpa,
         "thickness_mm": _THICKNESS * bundle.mesh.layers * bundle.mesh.cell_size_mm[2],
-        "poissons_ratio": _RATIO,
+        "poissons_ratio": ratio,
     }
     return replace(bundle, tolerances=tolerances)
 
@@ -71,14 +73,22 @@ class MadeGel:
     poissons_ratio: float
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator) -> MadeGel:
-        """One within the tolerances."""
+    def drawn(cls, rng: np.random.Generator, wide: int | None = None) -> MadeGel:
+        """One within the tolerances.
+
+        Args:
+            rng: Draws it.
+            wide: Seed of a Poisson's ratio with the deviation `WIDE_RATIO`, of which most of an
+                error comes: it is spread evenly, so that each gel has its own pad. None for
+                another deviation, which few pads serve.
+        """
         thickness, ratio = np.round(_STEPS[rng.integers(0, len(_STEPS), 2)], 6)
         designed = lit_bundle().material.poissons_ratio
+        off = _RATIO * ratio if wide is None else WIDE_RATIO * spread_normal(wide)
         return cls(
             float(np.exp(rng.normal(0, MODULUS_SIGMA))),
             float(np.exp(_THICKNESS * thickness)),
-            float(designed + _RATIO * ratio),
+            float(designed + off),
         )
 
 
@@ -117,9 +127,9 @@ class _Load:
     force_n: Array
 
 
-def _load(seed: int) -> _Load:
+def _load(seed: int, wide: bool = False) -> _Load:
     rng = np.random.default_rng([31, seed])
-    gel, gain = MadeGel.drawn(rng), float(np.exp(rng.normal(0, LIGHT_GAIN)))
+    gel, gain = MadeGel.drawn(rng, seed if wide else None), float(np.exp(rng.normal(0, LIGHT_GAIN)))
     pad = fine_pad(gel.thickness, gel.poissons_ratio)
     size = np.exp(rng.uniform(np.log(0.4), np.log(1.3)))
     return _Load(gel, gain, tractions(pad.points_mm, rng) * pad.cell_mm2 * size)
@@ -130,9 +140,9 @@ def press_force_n(seed: int) -> Array:
     return np.asarray(_load(seed).force_n.sum(axis=0))
 
 
-def press(seed: int) -> Contact:
-    """Random tractions."""
-    load = _load(seed)
+def press(seed: int, wide: bool = False) -> Contact:
+    """Random tractions on a gel as `MadeGel.drawn` gives it."""
+    load = _load(seed, wide)
     gel, gain, force = load.gel, load.light_gain, load.force_n
     pad = fine_pad(gel.thickness, gel.poissons_ratio)
     moved = pad.operator.displacement(force / gel.young)

@@ -34,6 +34,8 @@ from gelslim_force.settings import PipelineSettings
 
 Array = NDArray[np.float64]
 MODES = ("nothing given", "depth given", "ball given")
+WIDE = "nothing given, Poisson's ratio ± 0.02"
+"""A mode beside these, on gels as `sigma_cases.MadeGel.drawn` gives them with a seed."""
 COMPONENTS = ("F_x", "F_y", "F_z")
 RMS, COVERAGE = (0.8, 1.3), (0.90, 0.98)
 """What the gate asks for."""
@@ -52,17 +54,22 @@ class Score:
 
 
 @cache
-def _gel() -> BuiltGel:
+def _gel(wide: bool = False) -> BuiltGel:
     """The gel as specified; its share of the covariance is that of a gel whose law is linear."""
-    return built_gel(specified_bundle(), calibration(), None, PipelineSettings(gel="auto"))
+    return built_gel(specified_bundle(wide), calibration(), None, PipelineSettings(gel="auto"))
 
 
 @cache
-def _nothing_given() -> ForcePipeline:
+def _nothing_given(wide: bool = False) -> ForcePipeline:
+    bundle, gel = specified_bundle(wide), _gel(wide)
     source = unknown_shape(
-        specified_bundle(), calibration(), reference().image, settings=JointSettings(gamma=1.0)
+        bundle,
+        calibration(),
+        reference().image,
+        settings=JointSettings(gamma=1.0),
+        more=gel.more,
     )
-    return ForcePipeline(specified_bundle(), calibration(), normal=source, gel=_gel().share)
+    return ForcePipeline(bundle, calibration(), normal=source, gel=gel.share)
 
 
 @cache
@@ -78,14 +85,14 @@ def _ball_given(radius_mm: float) -> ForcePipeline:
 
 def contact_of(mode: str, seed: int) -> Contact:
     """The contact of a case."""
-    return ball(seed) if mode == "ball given" else press(seed)
+    return ball(seed) if mode == "ball given" else press(seed, mode == WIDE)
 
 
 def score(mode: str, condition: str, seed: int, contact: Contact) -> Score:
     """Process one frame of a contact."""
     given: dict[str, Any] = {}
-    if mode == "nothing given":
-        pipeline = _nothing_given()
+    if mode in ("nothing given", WIDE):
+        pipeline = _nothing_given(mode == WIDE)
     elif mode == "depth given":
         pipeline, given = _depth_given(), _given_depth(contact.height_mm, seed)
     else:
@@ -130,7 +137,8 @@ def scores(
 def _kept(mode: str, seed: int, folder: Path | None) -> Contact:
     if folder is None:
         return contact_of(mode, seed)
-    path = folder / f"{'ball' if mode == 'ball given' else 'press'}-{seed}.npz"
+    kind = {"ball given": "ball", WIDE: "wide"}.get(mode, "press")
+    path = folder / f"{kind}-{seed}.npz"
     if not path.exists():
         made = contact_of(mode, seed)
         np.savez_compressed(path, **vars(made))

@@ -72,6 +72,19 @@ def test_the_stored_scores_keep_the_gate() -> None:
         assert ((inside > COVERAGE[0]) & (inside < COVERAGE[1])).all(), mode
 
 
+def test_the_stored_scores_of_gels_that_are_hardly_known_keep_the_gate() -> None:
+    record = json.loads(STORED.read_text("utf-8"))["wide"]
+    assert set(record) == set(CONDITIONS)
+    error, sigma = (
+        np.concatenate([row[key] for row in record.values()]) for key in ("error_mn", "sigma_mn")
+    )
+    assert len(error) >= 180
+    z = error / sigma
+    rms, inside = np.sqrt((z**2).mean(axis=0)), (np.abs(z) < 1.96).mean(axis=0)
+    assert ((rms > RMS[0]) & (rms < RMS[1])).all()
+    assert ((inside > COVERAGE[0]) & (inside < COVERAGE[1])).all()
+
+
 def test_the_stored_scores_of_deep_contacts_hold() -> None:
     """The deviations of F_x and F_z keep the gate but for 2 % of coverage; F_y's are too large."""
     deep = json.loads(STORED.read_text("utf-8"))["deep"]

@@ -87,7 +87,7 @@ def test_a_gel_without_tolerances_changes_no_deviation() -> None:
     assert mono().gel is None
     assert isinstance(source, UnknownShape)
     assert source.estimator.off_design is not None
-    assert source.estimator.off_design.by_gel.size == 0
+    assert source.estimator.off_design.gel is None
 
 
 def test_rest_is_no_force() -> None:

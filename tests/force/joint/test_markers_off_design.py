@@ -25,6 +25,8 @@ from gelslim_force.settings import PipelineSettings
 
 Array = NDArray[np.float64]
 CASES, FIRST = 48, 400
+NONE = np.empty((0, 0, 3), np.uint8)
+"""The picture, which is not looked at."""
 LEAST_N = 0.1
 _95 = 1.959964
 LEAN = 0.01
@@ -75,7 +77,8 @@ def test_forces_and_deviations_by_the_markers_off_design() -> None:
 
 
 def of_positions(positions_px: Array) -> JointForces:
-    found = by_markers().estimator.estimate(np.empty((0, 0, 3), np.uint8), positions_px, 0.005)
+    estimator = by_markers().estimator
+    found = estimator.estimate(estimator.frame(NONE, positions_px, 0.005))
     assert found is not None
     return found
 
@@ -125,8 +128,9 @@ def test_forces_change_with_the_lean_of_the_view_as_their_covariance_says() -> N
     assert off_design is not None
     leaning = replace(source.estimator, off_design=replace(off_design, lean_sigma=LEAN))
     still = replace(source.estimator, off_design=replace(off_design, lean_sigma=0.0))
-    positions, none = pushed(), np.empty((0, 0, 3), np.uint8)
-    more, less = (e.estimate(none, positions, 0.005) for e in (leaning, still))
+    positions = pushed()
+    frame = still.frame(NONE, positions, 0.005)
+    more, less = (e.estimate(frame) for e in (leaning, still))
     assert more is not None
     assert less is not None
     sigma = np.sqrt(np.diag(more.covariance - less.covariance))

@@ -18,20 +18,26 @@ from pressed_samples import (
     calibration,
     lit_bundle,
     pressed,
+    pressed_by,
     reference,
+    round_patch,
     shaped,
 )
 from sensor_samples import sensor_bundle, sensor_grid
 from shaded_frames import shaded
 
-from gelslim_force.built_sensor import built_gel
+from gelslim_force.built_sensor import BuiltGel, built_gel
 from gelslim_force.calibration.file import write_calibration
 from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.settings import ON_NODES, JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
-from gelslim_force.sensor import SensorError, open_sensor, unknown_source
+from gelslim_force.presses.gel_calibration import specified_gel
+from gelslim_force.presses.gel_share import varied_bundles
+from gelslim_force.sensor import SensorError, normal_source, open_sensor, unknown_source
 from gelslim_force.settings import PipelineSettings
+from ifem_export.compliance.compliance_change import ComplianceChange
 from ifem_export.operators.solver import ConvergenceError
 
 Array = NDArray[np.float64]
@@ -121,6 +127,35 @@ def test_a_finer_pressure_is_fitted_unless_it_is_not_wanted() -> None:
     off = np.abs(finer.wrench.vector - truth.wrench)
     assert (off < 3 * finer.wrench.standard_deviation).all()
     assert abs(finer.wrench.force_n[2] - plain.wrench.force_n[2]) > 1e-4
+
+
+def test_forces_change_with_poissons_ratio_as_their_derivative_says() -> None:
+    """The same picture of a wide contact, explained by a gel of another ratio."""
+    truth = pressed_by(round_patch((0.5, -0.5), 3.6, 0.02, (0.2, 0.1)), 1, noise=0.0)
+    gel = specified_gel(replace(lit_bundle(), tolerances={"poissons_ratio": 0.02}))
+    assert gel is not None
+    (_, _, _), (_, varied, step) = varied_bundles(lit_bundle(), gel)
+    source = pipeline().normal
+    assert isinstance(source, UnknownShape)
+    designed = source.estimator
+    view, to_markers = designed.markers, designed.nodes_to_markers
+    gel_change = ComplianceChange.of(lit_bundle(), [(varied, step)])
+    designed = replace(designed, off_design=OffDesign(gel_change, to_markers, designed.by_height))
+    camera, rest = calibration(), reference().image
+    other = unknown_shape(varied, camera, rest, settings=LINEAR_CAMERA).estimator
+    places_px = view.camera.project(view.rest_mm + to_markers @ truth.moved_mm)
+    found, changed = (e.estimate(e.frame(truth.image, places_px, 0.005)) for e in (designed, other))
+    assert found is not None
+    assert found.by_gel is not None
+    assert changed is not None
+    opened = normal_source(BuiltGel(lit_bundle(), camera, None, ((varied, step),)), rest)
+    assert isinstance(opened, UnknownShape)
+    for made_for, known in ((source, True), (opened, False)):
+        assert made_for.estimator.off_design is not None
+        assert (made_for.estimator.off_design.gel is None) == known
+    change = (changed.force_n - found.force_n).sum(axis=0) / step
+    assert np.linalg.norm(change - found.by_gel[0, :3]) < 0.15 * np.linalg.norm(change)
+    assert abs(change[0] - found.by_gel[0, 0]) < 0.15 * abs(change[0])
 
 
 def test_no_contact_is_no_force() -> None:

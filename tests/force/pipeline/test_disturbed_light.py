@@ -92,7 +92,10 @@ def test_a_press_under_a_reflection_is_right_or_not_told(
 
 
 def test_compressed_pictures_of_an_untouched_gel_are_no_press_of_a_named_ball() -> None:
-    """Blocks of JPEG near the rim of the gel have the light of a ball of up to 58 mN."""
+    """Blocks of JPEG near the rim of the gel had the light of a ball of up to 58 mN.
+
+    Their errors count as what bins share, so that the ball alone is not deceived either.
+    """
     still = untouched()
     deceived = 0
     for seed in range(60):
@@ -107,7 +110,7 @@ def test_compressed_pictures_of_an_untouched_gel_are_no_press_of_a_named_ball() 
         if results[0].wrench is not None and results[1].wrench is not None:
             deceived += abs(results[0].wrench.force_n[2]) > least_press_n()
             assert np.nanmax(np.abs(results[1].wrench.force_n)) < least_press_n()
-    assert deceived >= 1
+    assert deceived == 0
 
 
 def test_a_named_ball_that_is_not_seen_may_press_with_the_least_force_that_is() -> None:

@@ -35,10 +35,11 @@ def image_px(folder, effect: str, block: str) -> float:
         # At most half a dot and half a speck: the distance of their centres when they touch.
         ("dirt", "specks: 1, speck_mm: 5, opacity: 1", (DOT_PX + 5 * SCALE_PX_PER_MM) / 2),
         ("dirt", "opacity: 1", 0.0),
-        # A quarter of the blur disc, half the path in the open shutter, a quarter of a dot.
+        # A quarter of the blur disc, half the path of a dot 1.5 times as fast as the tool, a
+        # quarter of a dot.
         ("defocus", "use: auto", BLUR_PX / 4),
         ("defocus", "still_px: 2", math.hypot(BLUR_PX, 8) / 4),
-        ("motion_blur", "shutter_ms: 20", TIP_MM_S * 0.02 * SCALE_PX_PER_MM / 2),
+        ("motion_blur", "shutter_ms: 20", 1.5 * TIP_MM_S * 0.02 * SCALE_PX_PER_MM / 2),
         ("marker_print", "odd_percent: 1", DOT_PX / 4),
         ("marker_print", "missing_percent: 1", 1.0 * SCALE_PX_PER_MM),
         (
