@@ -50,8 +50,7 @@ _LEAST_NODES, _CLOSE = 3, 1
 """The latter: steps about the contact within which heights at half the pitch count."""
 _ROUGH_TOLERANCE = 2e-4  # of forces on the nodes that those at half the pitch follow
 _SETTLED, _FAR = 0.01, 0.2
-"""Changes of the force, relative to it: one after which another linearisation changes little, and
-one since the frame before, after which forces on the nodes need another."""
+"""Changes of the force over it after which another linearisation changes little, and is needed."""
 _HELD_SLOPE = 0.07
 """Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
 random contacts then differ from those of another linearisation by 0.03 standard deviations in the
@@ -85,6 +84,7 @@ class JointEstimator:
         deep_mm: Depth from which a contact is deep.
         finer: The surface between the nodes, as the light sees it; None for cubic convolution.
         pressure: Normal forces at half the pitch; None for those on the nodes alone.
+        finer_to_mm: Depth to which these are used.
     """
 
     points_mm: Array
@@ -109,6 +109,7 @@ class JointEstimator:
     deep_mm: float = math.inf
     finer: FinerSurface | None = None
     pressure: FinerPressure | None = None
+    finer_to_mm: float = math.inf
 
     def frame(self, image: NDArray[np.uint8], markers_px: Array, noise_px: float) -> FrameData:
         """Data of a frame.
@@ -148,12 +149,12 @@ class JointEstimator:
     def _last_rounds(self, frame: FrameData, nodes: Mask, state: FitState) -> tuple[Mask, FitState]:
         """`following_rounds`; the last one is at half the pitch where that is asked for."""
         rounds = self.settings.following_rounds
-        if self.pressure is None or frame.seen is None:
+        begun, deepest_mm = state, -float(state.near_mm.min(initial=0.0))
+        if self.pressure is None or frame.seen is None or deepest_mm > self.finer_to_mm:
             return self._rounds(frame, nodes, state, rounds)
-        before = state
         for _ in range(rounds[0]):
             state = self._round(frame, np.flatnonzero(nodes), state)
-        if not state.near(before, _FAR):
+        if not state.near(begun, _FAR):
             state = self._round(frame, np.flatnonzero(nodes), state)
         nodes = self._pressing(nodes, state)
         if self.deepness(state) > 0:
@@ -167,10 +168,7 @@ class JointEstimator:
         return pressing_nodes(nodes, pressure, self.neighbours, least)
 
     def shown(self, image: NDArray[np.uint8], markers_px: Array) -> Mask:
-        """(c,) nodes whose slope the light of a frame shows, with arguments as in `estimate`.
-
-        Raises LostColourError for a grey picture where the rest has colour.
-        """
+        """(c,) nodes whose slope the light of a frame shows; arguments and errors as in `frame`."""
         return self._shown(None if self.light is None else self.light.look(image, markers_px))
 
     def _rounds(

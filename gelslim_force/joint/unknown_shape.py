@@ -234,6 +234,8 @@ def unknown_shape(
         deep_mm=math.inf if gel == "linear" else deep_mm(bundle),
         finer=None if finer is None else finer.surface,
         pressure=finer if chosen.finer_pressure else None,
+        # What a linear gel has wrong in deep contacts is not to be found between the nodes.
+        finer_to_mm=deep_mm(bundle) if gel == "linear" else math.inf,
     )
     estimator = replace(estimator, off_design=_off_design(bundle, estimator, calibration, more))
     if seen is None:

@@ -33,6 +33,11 @@ CONTACTS = {
 }
 
 
+WIDER = JointSettings(least_pressure=0.15)
+"""With nodes about the rim that hardly press: the forces there are free to change with the gel. With
+fewer of them, the same derivatives are up to 12 % off."""
+
+
 @cache
 def more() -> tuple[tuple[Bundle, float], ...]:
     """The sensor with a thicker gel, and with one of a larger Poisson's ratio."""
@@ -48,7 +53,7 @@ def source(parameter: int | None = None, finer: bool = False) -> UnknownShape:
         bundle,
         calibration(),
         reference().image,
-        settings=replace(JointSettings() if finer else ON_NODES, gamma=1.0),
+        settings=replace(WIDER if finer else ON_NODES, gamma=1.0),
         more=more() if parameter is None else (),
     )
 
