@@ -34,7 +34,7 @@ CONTACTS = {
 
 
 WIDER = JointSettings(least_pressure=0.15)
-"""With nodes about the rim that hardly press: the forces there are free to change with the gel. With
+"""With nodes about the rim that hardly press, whose forces are free to change with the gel. With
 fewer of them, the same derivatives are up to 12 % off."""
 
 
