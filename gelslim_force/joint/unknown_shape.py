@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
+_FINER_TO = 1.5
+"""Depth to which a linear gel is fitted at half the pitch, over that from which it is deep."""
 LARGEST_UNEXPLAINED = 0.7
 _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the light unexplained"
 _UNCERTAIN = (
@@ -235,7 +237,7 @@ def unknown_shape(
         finer=None if finer is None else finer.surface,
         pressure=finer if chosen.finer_pressure else None,
         # What a linear gel has wrong in deep contacts is not to be found between the nodes.
-        finer_to_mm=deep_mm(bundle) if gel == "linear" else math.inf,
+        finer_to_mm=_FINER_TO * deep_mm(bundle) if gel == "linear" else math.inf,
     )
     estimator = replace(estimator, off_design=_off_design(bundle, estimator, calibration, more))
     if seen is None:
