@@ -84,7 +84,7 @@ class JointEstimator:
         deep_mm: Depth from which a contact is deep.
         finer: The surface between the nodes, as the light sees it; None for cubic convolution.
         pressure: Normal forces at half the pitch; None for those on the nodes alone.
-        finer_to_mm: Depth to which these are used.
+        finer_to_mm: Depth of a contact to which these are used.
     """
 
     points_mm: Array
@@ -149,17 +149,18 @@ class JointEstimator:
     def _last_rounds(self, frame: FrameData, nodes: Mask, state: FitState) -> tuple[Mask, FitState]:
         """`following_rounds`; the last one is at half the pitch where that is asked for."""
         rounds = self.settings.following_rounds
-        begun, deepest_mm = state, -float(state.near_mm.min(initial=0.0))
-        if self.pressure is None or frame.seen is None or deepest_mm > self.finer_to_mm:
+        if self.pressure is None or frame.seen is None:
             return self._rounds(frame, nodes, state, rounds)
+        begun = state
         for _ in range(rounds[0]):
             state = self._round(frame, np.flatnonzero(nodes), state)
         if not state.near(begun, _FAR):
             state = self._round(frame, np.flatnonzero(nodes), state)
         nodes = self._pressing(nodes, state)
-        if self.deepness(state) > 0:
+        too_deep = -float(state.near_mm.min(initial=0.0)) > self.finer_to_mm
+        if too_deep or self.deepness(state) > 0:
             nodes, state = self._rounds(frame, nodes, state, rounds[1:])
-        return nodes, refined(self, frame, np.flatnonzero(nodes), state)
+        return nodes, state if too_deep else refined(self, frame, np.flatnonzero(nodes), state)
 
     def _pressing(self, nodes: Mask, state: FitState) -> Mask:
         """Those of the nodes (c,) that press in an estimate, and what they enclose."""

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
-_FINER_TO = 1.5
+_FINER_TO = 1.6
 """Depth to which a linear gel is fitted at half the pitch, over that from which it is deep."""
 LARGEST_UNEXPLAINED = 0.7
 _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the light unexplained"
