@@ -63,7 +63,8 @@ class RealSensor:
         dots = Detector(self.rest.settings).detect(image)
         tracks = match(self.rest.reference, dots.centres_px)
         noise = noise_px(self.rest.reference, tracks.displacement_px)
-        return self.estimator.estimate(image, tracks.positions_px, noise), tracks
+        frame = self.estimator.frame(image, tracks.positions_px, noise)
+        return self.estimator.estimate(frame), tracks
 
 
 @pytest.fixture(scope="module")
