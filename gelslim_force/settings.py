@@ -43,7 +43,7 @@ class PipelineSettings:
         drift: How drift of the camera against the gel is treated.
         finer_pressure: Whether the forces of an object of unknown shape, by light and markers, are
             fitted at last with normal forces at half the pitch of the nodes. Without it, a frame
-            takes two thirds of the time, and the normal force has a common bias of 2 %.
+            takes 70 % of the time, and normal forces are 2 % too small in the mean.
         check_indenter: Whether a named indenter is compared with the forces of an unknown shape,
             where light and colour allow these.
 

@@ -50,7 +50,8 @@ _LEAST_NODES, _CLOSE = 3, 1
 """The latter: steps about the contact within which heights at half the pitch count."""
 _ROUGH_TOLERANCE = 2e-4  # of forces on the nodes that those at half the pitch follow
 _SETTLED, _FAR = 0.01, 0.2
-"""Changes of the force over it after which another linearisation changes little, and is needed."""
+"""Relative changes of the force: below the first, another linearisation changes little; above the
+second, since the frame before, the forces on the nodes need another one."""
 _HELD_SLOPE = 0.07
 """Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
 random contacts then differ from those of another linearisation by 0.03 standard deviations in the
@@ -84,7 +85,7 @@ class JointEstimator:
         deep_mm: Depth from which a contact is deep.
         finer: The surface between the nodes, as the light sees it; None for cubic convolution.
         pressure: Normal forces at half the pitch; None for those on the nodes alone.
-        finer_to_mm: Depth of a contact to which these are used.
+        finer_to_mm: Depth of a contact beyond which its forces are on the nodes alone.
     """
 
     points_mm: Array
