@@ -86,14 +86,15 @@ def test_the_stored_scores_of_gels_that_are_hardly_known_keep_the_gate() -> None
 
 
 def test_the_stored_scores_of_deep_contacts_hold() -> None:
-    """The deviations of F_x and F_z keep the gate but for 2 % of coverage; F_y's are too large."""
+    """Near the gate: deviations of shear are up to a third too large, coverage lacks up to 2 %."""
     deep = json.loads(STORED.read_text("utf-8"))["deep"]
     assert set(deep) == {"linear", "auto"}
     for law, row in deep.items():
         z = np.array(row["error_mn"]) / np.array(row["sigma_mn"])
         assert len(z) + row["refused"] >= 40
         rms, inside = np.sqrt((z**2).mean(axis=0)), (np.abs(z) < 1.96).mean(axis=0)
-        assert (rms[[0, 2]] > RMS[0]).all(), law
+        assert rms[2] > RMS[0], law
+        assert (rms > 0.7).all(), law
         assert (rms < RMS[1]).all(), law
         assert (inside > 0.88).all(), law
     assert deep["auto"]["relative"]["normal"] < 0.5 * deep["linear"]["relative"]["normal"]
