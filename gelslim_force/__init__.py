@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gelslim_force.forces.wrench import Wrench
     from gelslim_force.frames.frame import Frame
     from gelslim_force.frames.source import open_frames
-    from gelslim_force.joint.light_calibration import (
+    from gelslim_force.joint.light.calibration import (
         LightCalibration,
         read_light_calibration,
         write_light_calibration,

@@ -10,7 +10,7 @@ import numpy as np
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.forces.finite_strain import law_of
-from gelslim_force.joint.light_calibration import LightCalibration, read_light_calibration
+from gelslim_force.joint.light.calibration import LightCalibration, read_light_calibration
 from gelslim_force.presses.gel_calibration import (
     GelCalibration,
     read_gel_calibration,

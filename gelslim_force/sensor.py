@@ -22,7 +22,7 @@ from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.checked_indenter import CheckedIndenter
-from gelslim_force.joint.light_calibration import LightCalibration
+from gelslim_force.joint.light.calibration import LightCalibration
 from gelslim_force.joint.settings import ON_NODES, WITNESS, JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, layer_stiffness_n_mm, unknown_shape
 from gelslim_force.pipeline import ForcePipeline

@@ -23,9 +23,9 @@ from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces, SoughtForces
-from gelslim_force.joint.light_rows import LightRows
-from gelslim_force.joint.light_sums import LightSums, placed_bins
-from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.light.rows import LightRows
+from gelslim_force.joint.light.sums import LightSums, placed_bins
+from gelslim_force.joint.light.view import LightView, SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows, rms_length
 from gelslim_force.joint.model_errors import edge_nodes, wrench_spread
 from gelslim_force.joint.moved_region import MovedRegion

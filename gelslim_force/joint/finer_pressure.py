@@ -116,7 +116,7 @@ class FinerPressure:
             tangential: Nodes (p,) with forces (p, 2).
             normal: Places (q,) with normal forces (q,).
         """
-        from gelslim_force.joint.light_kernel import add_stencils
+        from gelslim_force.joint.kernels.light_kernel import add_stencils
 
         nodes, force = tangential
         found = self.surface.heights(moved, nodes, np.column_stack([force, np.zeros(len(nodes))]))
@@ -136,7 +136,7 @@ class FinerPressure:
             near: (m,) places of the heights.
             parts: What is unknown.
         """
-        from gelslim_force.joint.finer_kernel import (
+        from gelslim_force.joint.kernels.finer_kernel import (
             interpolated_rows,
             mark_columns,
             stencil_columns,
@@ -169,7 +169,7 @@ class FinerPressure:
 
     def in_parts(self, rows: Any, parts: PressureParts) -> Any:
         """Columns (n, q + 2p) of the unknown forces by those (n, 3r) of forces on `bearing`."""
-        from gelslim_force.joint.finer_kernel import columns_in_parts
+        from gelslim_force.joint.kernels.finer_kernel import columns_in_parts
 
         corners = np.searchsorted(parts.bearing, self.corners[parts.places])
         nodes = np.searchsorted(parts.bearing, parts.nodes)

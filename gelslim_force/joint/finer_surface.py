@@ -47,7 +47,7 @@ class FinerSurface:
 
     def heights(self, height_mm: Array, nodes: Nodes, force_n: Array) -> Array:
         """Heights (f,) by those of all nodes (c,) and the forces (p, 3) on some of them (p,)."""
-        from gelslim_force.joint.light_kernel import add_stencils
+        from gelslim_force.joint.kernels.light_kernel import add_stencils
 
         found = np.ascontiguousarray(self.interpolation @ height_mm)
         force = np.ascontiguousarray(force_n, dtype=float)

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.joint.light_rows import LightRows
-from gelslim_force.joint.light_view import SeenLight
+from gelslim_force.joint.light.rows import LightRows
+from gelslim_force.joint.light.view import SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows
 from gelslim_force.joint.normal_equations import Linearised, NormalEquations
 from gelslim_force.joint.responses import Responses

@@ -48,7 +48,7 @@ class MarkerRows:
                 the noise.
             errors: Deviation of all, share of the bending, and limit of the residuals.
         """
-        from gelslim_force.joint.fit_kernel import marker_data
+        from gelslim_force.joint.kernels.fit_kernel import marker_data
 
         residual, weight = np.empty((2, 2 * len(used)))
         marker_data(used, lateral_mm, *motion, errors, residual, weight)

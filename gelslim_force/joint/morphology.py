@@ -46,7 +46,7 @@ def filled(picture: Mask) -> Mask:
 
 
 def _distance(picture: Mask, outside: bool) -> NDArray[np.int64]:
-    from gelslim_force.joint.region_kernel import city_block
+    from gelslim_force.joint.kernels.region_kernel import city_block
 
     distance = np.empty(picture.shape, dtype=np.int64)
     city_block(np.ascontiguousarray(picture), outside, distance)

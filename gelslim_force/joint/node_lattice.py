@@ -40,7 +40,7 @@ class SlopeTaps:
 
     def slopes(self, height_mm: Array) -> Array:
         """(n, 2) slopes of a surface with nodes of the given heights (c,)."""
-        from gelslim_force.joint.place_kernel import sums_of_taps
+        from gelslim_force.joint.kernels.place_kernel import sums_of_taps
 
         found = np.empty((len(self.nodes), 2))
         sums_of_taps(self.nodes, self.along, self.across, height_mm, found)
@@ -52,7 +52,7 @@ class SlopeTaps:
         With the deformation gradient F = I + ∂u/∂x of the plane, they are F⁻ᵀ times the slopes by
         the places at rest. F is taken with a determinant of at least 0.3.
         """
-        from gelslim_force.joint.place_kernel import turn_taps
+        from gelslim_force.joint.kernels.place_kernel import turn_taps
 
         along, across = np.empty_like(self.along), np.empty_like(self.across)
         turn_taps(self.nodes, self.along, self.across, lateral_mm, _LEAST_AREA, along, across)
@@ -60,7 +60,7 @@ class SlopeTaps:
 
     def turned(self, turn: Array) -> SlopeTaps:
         """The slopes times matrices (n, 2, 2)."""
-        from gelslim_force.joint.place_kernel import turn_slopes
+        from gelslim_force.joint.kernels.place_kernel import turn_slopes
 
         along, across = self.along.copy(), self.across.copy()
         turn_slopes(along, across, turn)
@@ -135,7 +135,7 @@ class NodeLattice:
 
     def values_at(self, values: Array, points_mm: Array) -> Array:
         """Bilinear interpolation (n, ...) of nodal values (c, ...) at points (n, 2)."""
-        from gelslim_force.joint.light_kernel import bilinear
+        from gelslim_force.joint.kernels.light_kernel import bilinear
 
         at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
         columns = np.ascontiguousarray(values, dtype=float).reshape(len(values), -1)
@@ -145,7 +145,7 @@ class NodeLattice:
 
     def adjacent(self, nodes: Nodes) -> Array:
         """(p, p) with 1 where two of the nodes (p,) are one step along x or y apart."""
-        from gelslim_force.joint.place_kernel import mark_adjacent
+        from gelslim_force.joint.kernels.place_kernel import mark_adjacent
 
         found = np.zeros((len(nodes), len(nodes)))
         mark_adjacent(self.place[nodes], found)
@@ -153,7 +153,7 @@ class NodeLattice:
 
     def slopes_at(self, points_mm: Array) -> SlopeTaps:
         """Slopes along x and along y at (n, 2), by the heights of the nodes."""
-        from gelslim_force.joint.light_kernel import cubic_taps
+        from gelslim_force.joint.kernels.light_kernel import cubic_taps
 
         at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
         nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)
@@ -168,7 +168,7 @@ class NodeLattice:
             points_mm: (n, 2).
             close: (mx, my) places of the lattice of every other place, about which all are used.
         """
-        from gelslim_force.joint.finer_kernel import taps_of_two_pitches
+        from gelslim_force.joint.kernels.finer_kernel import taps_of_two_pitches
 
         at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
         nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 if TYPE_CHECKING:
-    from gelslim_force.joint.light_sums import LightSums
+    from gelslim_force.joint.light.sums import LightSums
     from gelslim_force.joint.marker_rows import MarkerRows
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ class NormalEquations:
             heights: (m, 3p) heights per force.
             gain: Expected change of the gain, and its standard deviation.
         """
-        from gelslim_force.joint.fit_kernel import add_light
+        from gelslim_force.joint.kernels.fit_kernel import add_light
 
         expected, sigma = gain
         own = light.by_gain + sigma**-2
@@ -98,7 +98,7 @@ class NormalEquations:
             normal_mpa: Standard deviation of the pressure.
             tangential_mpa: Standard deviation of the tangential traction.
         """
-        from gelslim_force.joint.fit_kernel import add_prior
+        from gelslim_force.joint.kernels.fit_kernel import add_prior
 
         hessian, slope = self.hessian.copy(), self.slope.copy()
         sizes = np.array([tangential_mpa, tangential_mpa, normal_mpa])
@@ -182,7 +182,7 @@ class Linearised:
 
         The data must be those of all nodes.
         """
-        from gelslim_force.joint.fit_kernel import take_nodes
+        from gelslim_force.joint.kernels.fit_kernel import take_nodes
 
         kept = np.flatnonzero(np.isin(self.nodes, nodes, assume_unique=True))
         free = (3 * kept[:, None] + np.arange(3)).ravel()
@@ -208,7 +208,7 @@ def _banded_product(matrix: Any, right: Any) -> Any:
 
     Heights of nodes that are far apart share no bin: only a band of the matrix is not zero.
     """
-    from gelslim_force.joint.fit_kernel import half_width
+    from gelslim_force.joint.kernels.fit_kernel import half_width
 
     size = len(matrix)
     width, found = half_width(matrix), np.empty_like(right)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.joint.light_rows import LightRows
+from gelslim_force.joint.light.rows import LightRows
 from ifem_export.compliance.compliance_change import ComplianceChange
 
 Array = NDArray[np.float64]

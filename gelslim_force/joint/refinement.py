@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from gelslim_force.joint.deepness import roughness_mpa
 from gelslim_force.joint.finer_pressure import FinerPressure, PressureParts
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, SoughtForces
-from gelslim_force.joint.light_rows import LightRows
+from gelslim_force.joint.light.rows import LightRows
 from gelslim_force.joint.normal_equations import STEPS, NormalEquations
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class _Refinement:
         self, equations: NormalEquations, state: FitState, before: Array
     ) -> NormalEquations:
         """With smooth tractions of limited size, for forces `before` (q + 2p,)."""
-        from gelslim_force.joint.finer_kernel import add_smoothness
+        from gelslim_force.joint.kernels.finer_kernel import add_smoothness
 
         estimator, parts, nodes = self.estimator, self.parts, self.parts.nodes
         chosen, young, area = estimator.settings, estimator.youngs_modulus_mpa, estimator.area_mm2

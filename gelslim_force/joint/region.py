@@ -142,7 +142,7 @@ def changed_bins(shading: ShadingChange) -> Mask:
     Returns:
         The bins; none where nothing exceeds the noise.
     """
-    from gelslim_force.joint.region_kernel import bins_above_noise
+    from gelslim_force.joint.kernels.region_kernel import bins_above_noise
 
     if shading.grain is not None and shading.grain[:2].max() > 1:
         return _whole(widened(opened(_changed_widely(shading), _OPENED), _RIM))

@@ -44,7 +44,7 @@ class Responses:
             markers: (n,) those used.
             by_height: (n, 2) lateral motion that the picture shows per mm less of height.
         """
-        from gelslim_force.joint.light_kernel import gather_markers
+        from gelslim_force.joint.kernels.light_kernel import gather_markers
 
         self._make(nodes)
         rows = np.empty((2 * len(markers), 3 * len(nodes)), dtype=np.float32)
@@ -53,7 +53,7 @@ class Responses:
 
     def of_heights(self, nodes: Nodes, near: Nodes) -> Single:
         """(m, 3p) heights of the nodes `near` (m,) under forces on nodes (p,)."""
-        from gelslim_force.joint.light_kernel import gather_heights
+        from gelslim_force.joint.kernels.light_kernel import gather_heights
 
         self._make(nodes)
         heights = np.empty((len(near), 3 * len(nodes)), dtype=np.float32)

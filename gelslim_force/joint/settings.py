@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gelslim_force.joint.light_calibration import LightCalibration
+    from gelslim_force.joint.light.calibration import LightCalibration
 
 
 @dataclass(frozen=True)

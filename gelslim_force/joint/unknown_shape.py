@@ -24,8 +24,8 @@ from gelslim_force.joint.estimator import JointEstimator
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import JointForces
-from gelslim_force.joint.light_calibration import LightCalibration
-from gelslim_force.joint.light_view import LightView
+from gelslim_force.joint.light.calibration import LightCalibration
+from gelslim_force.joint.light.view import LightView
 from gelslim_force.joint.marker_misfit import with_misfit
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.forces.gel_law import GelLaw, GelUse
 from gelslim_force.frames.upright import upright
-from gelslim_force.joint.light_calibration import LightCalibration
-from gelslim_force.joint.light_view import LightView
+from gelslim_force.joint.light.calibration import LightCalibration
+from gelslim_force.joint.light.view import LightView
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.presses.ball_check import fitted_ball, require_ball

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.joint.light_calibration import TERMS, place_terms
-from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.light.calibration import TERMS, place_terms
+from gelslim_force.joint.light.view import LightView, SeenLight
 from gelslim_force.joint.normal_equations import huber
 from gelslim_force.presses.ball_on_layer import BallOnLayer
 from gelslim_optics.light.light_law import LightLaw

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from gelslim_core.html_table import table_html
-from gelslim_force.joint.light_calibration import LightCalibration
+from gelslim_force.joint.light.calibration import LightCalibration
 from gelslim_force.presses.calibrate_light import COLOURS
 from gelslim_force.presses.gel_report import STYLE, sentence
 

@@ -25,7 +25,7 @@ from gelslim_twin.scene.built_look import BuiltLook, LookError
 from ifem_export.operators.single_thread import single_threaded
 
 if TYPE_CHECKING:
-    from gelslim_force.joint.light_calibration import LightCalibration
+    from gelslim_force.joint.light.calibration import LightCalibration
     from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.render.frame_renderer import FrameRenderer
     from ifem_export.bundle.bundle import Bundle

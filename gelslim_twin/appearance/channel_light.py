@@ -93,7 +93,7 @@ def mixed_fans(light: LightMap, channels: int, gain_terms: Array) -> LightFans:
     Returns:
         Fans of c sources, whose bins are those of all lamps side by side.
     """
-    from gelslim_force.joint.light_calibration import GAINS, place_terms
+    from gelslim_force.joint.light.calibration import GAINS, place_terms
 
     own = light.light_fans
     sums = own.sums

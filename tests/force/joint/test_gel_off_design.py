@@ -17,8 +17,8 @@ from sigma_cases import specified_bundle
 from sigma_gate import WIDE, scores, summaries
 
 from gelslim_force.joint.fit_state import JointForces
-from gelslim_force.joint.light_rows import LightRows
-from gelslim_force.joint.light_sums import LightSums
+from gelslim_force.joint.light.rows import LightRows
+from gelslim_force.joint.light.sums import LightSums
 from gelslim_force.joint.settings import ON_NODES, JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.presses.gel_calibration import specified_gel

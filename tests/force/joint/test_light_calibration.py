@@ -13,7 +13,7 @@ from pressed_samples import calibration, light_map, lit_bundle, pressed, referen
 
 from gelslim_force.built_sensor import built_light
 from gelslim_force.calibration.error import CalibrationError
-from gelslim_force.joint.light_calibration import (
+from gelslim_force.joint.light.calibration import (
     GAINS,
     LightCalibration,
     light_calibration_record,

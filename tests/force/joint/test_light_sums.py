@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelslim_force.joint.light_kernel import saturated_bins
-from gelslim_force.joint.light_sums import PlacedBins
+from gelslim_force.joint.kernels.light_kernel import saturated_bins
+from gelslim_force.joint.light.sums import PlacedBins
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_optics.light.light_law import LightLaw
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import uniform_filter
 
 from gelslim_force.contact.shading_change import ShadingChange
-from gelslim_force.joint.light_view import SeenLight, independent_noise
+from gelslim_force.joint.light.view import SeenLight, independent_noise
 from gelslim_force.joint.region import changed_bins
 
 SHAPE = 2, 120, 160

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from gelslim_force.joint.light_sums import LightSums
+from gelslim_force.joint.light.sums import LightSums
 from gelslim_force.joint.normal_equations import NormalEquations, huber
 from gelslim_force.joint.settings import JointSettings
 

@@ -17,7 +17,7 @@ from ball_presses import (
 from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.joint.light_calibration import LightCalibration
+from gelslim_force.joint.light.calibration import LightCalibration
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.pipeline import ForcePipeline

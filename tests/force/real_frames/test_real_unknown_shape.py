@@ -19,7 +19,7 @@ from gelslim_force.detection.detection import Detector
 from gelslim_force.dot_tracking import DotsAtRest, dots_at_rest
 from gelslim_force.joint.estimator import JointEstimator
 from gelslim_force.joint.fit_state import JointForces
-from gelslim_force.joint.light_view import LightView
+from gelslim_force.joint.light.view import LightView
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings

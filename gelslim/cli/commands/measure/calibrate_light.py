@@ -12,7 +12,7 @@ from gelslim.cli.calibration_files import CalibrationFiles, tell
 from gelslim.cli.options import AsJson, SensorBundle
 
 if TYPE_CHECKING:
-    from gelslim_force.joint.light_calibration import LightCalibration
+    from gelslim_force.joint.light.calibration import LightCalibration
 
 
 def calibrate_light(
@@ -61,7 +61,7 @@ def calibrate_light(
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
     from gelslim_force.calibration.reference_picture import read_reference
-    from gelslim_force.joint.light_calibration import light_calibration_record
+    from gelslim_force.joint.light.calibration import light_calibration_record
     from gelslim_force.presses.calibrate_light import calibrate_light as calibrated
     from gelslim_force.presses.gel_calibration import read_gel_calibration
     from gelslim_force.presses.light_report import light_report_html

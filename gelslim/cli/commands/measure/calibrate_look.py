@@ -58,7 +58,7 @@ def calibrate_look(
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
     from gelslim_force.calibration.reference_picture import read_reference
-    from gelslim_force.joint.light_calibration import read_light_calibration
+    from gelslim_force.joint.light.calibration import read_light_calibration
     from gelslim_force.presses.press_pictures import picture_names, press_pictures
     from gelslim_twin.appearance.calibrate_look import calibrate_look as calibrated
     from gelslim_twin.appearance.look_report import look_report_html

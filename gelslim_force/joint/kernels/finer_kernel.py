@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from gelslim_core.kernel_cache import drop_stale
-from gelslim_force.joint.light_kernel import cubic
+from gelslim_force.joint.kernels.light_kernel import cubic
 
 drop_stale(["finer_kernel"], ["light_kernel"], Path(__file__).parent)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.joint.light_sums import LightSums
+from gelslim_force.joint.light.sums import LightSums
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]

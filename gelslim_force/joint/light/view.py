@@ -15,7 +15,7 @@ from gelslim_force.contact.shading_change import (
     ShadingReference,
     as_picture,
 )
-from gelslim_force.joint.light_calibration import LightCalibration
+from gelslim_force.joint.light.calibration import LightCalibration
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_optics.light.light_map import LightMap
@@ -173,7 +173,7 @@ class LightView:
         return np.asarray((bins > 0) & (free >= _SHOWN * bins))
 
     def _saturated(self, picture: NDArray[np.uint8]) -> Mask:
-        from gelslim_force.joint.light_kernel import saturated_bins
+        from gelslim_force.joint.kernels.light_kernel import saturated_bins
 
         found = np.zeros((len(self.channels), *self._light.shape), dtype=bool)
         # Most pictures have no such pixel, which the maximum shows much faster.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.light.view import LightView, SeenLight
 from gelslim_force.joint.node_lattice import NodeLattice, SlopeTaps
 from gelslim_optics.light.light_law import SCATTERED, LightLaw
 
@@ -110,7 +110,7 @@ class PlacedBins:
             gain: Present gain of the light.
             light_error: Standard deviation of the mean change over 1 mm².
         """
-        from gelslim_force.joint.light_kernel import light_data, number_nodes, slope_sums
+        from gelslim_force.joint.kernels.light_kernel import light_data, number_nodes, slope_sums
 
         slope = self.taps.slopes(height_mm) if self.slope is None else self.slope
         shape = self.change.shape
@@ -199,7 +199,7 @@ def _at_rest(
     view: LightView, seen: SeenLight, lattice: NodeLattice, displacement_mm: Array, near: Mask
 ) -> tuple[Nodes, Array]:
     """The valid bins among the nodes `near` (c,), and their places (n, 2) on the gel at rest."""
-    from gelslim_force.joint.place_kernel import bins_at_rest
+    from gelslim_force.joint.kernels.place_kernel import bins_at_rest
 
     valid, rest = seen.shading.valid.ravel(), view.rest_mm.reshape(-1, 2)
     bins, places = np.empty(len(valid), dtype=np.intp), np.empty((len(valid), 2))

@@ -1,0 +1,1 @@
+"""Compiled loops of the fit: nodes, light, finer pressure, places and regions."""

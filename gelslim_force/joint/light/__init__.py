@@ -1,0 +1,1 @@
+"""The change of light of a contact: its calibration, what is seen, sums and equations."""
