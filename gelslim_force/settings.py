@@ -55,7 +55,7 @@ class PipelineSettings:
     budget: Budget | None = None
     compensation: Compensation = "exact"
     interpolation: Interpolation = "sparse"
-    gel: Gel = "linear"
+    gel: Gel = "auto"
     force: ForceSettings = field(default_factory=ForceSettings)
     noise_px: float | None = None
     unknown_normal_mm: float = 0.3
@@ -124,7 +124,7 @@ class PipelineSettings:
         """The law of the gel, where it is not that of the operator alone."""
         if law_of(bundle, self.gel) == "linear":
             return None
-        strained = FiniteStrainForce(bundle, membranes=bundle.membranes)
+        strained = FiniteStrainForce.per_frame(bundle)
         if self.gel == "neo_hookean":
             return strained
         return DepthLaw(operator, strained, deep_mm(bundle))

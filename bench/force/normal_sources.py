@@ -46,6 +46,7 @@ from gelslim_force.joint.settings import JointSettings  # noqa: E402
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape  # noqa: E402
 from gelslim_force.pipeline import ForcePipeline  # noqa: E402
 from gelslim_force.sensor import indenter_source  # noqa: E402
+from gelslim_force.settings import PipelineSettings  # noqa: E402
 
 Array = NDArray[np.float64]
 ANY, BALL = "any object", "ball"
@@ -117,7 +118,7 @@ def ball_press(number: int) -> Press:
 def sources(kind: str) -> dict[str, Process]:
     """How each press is processed, by what is known; the poorest knowledge first."""
     joint = shape_source(2)
-    chain = ForcePipeline(lit_bundle(), calibration(), normal=joint)
+    chain = ForcePipeline(lit_bundle(), calibration(), PipelineSettings(gel="linear"), joint)
     alone = replace(joint.estimator.settings, marker_mm=_UNUSED_MM)
     two = replace(joint.estimator, settings=alone)
     one = replace(shape_source(1).estimator, settings=alone, responses=two.responses)
@@ -156,9 +157,9 @@ def sources(kind: str) -> dict[str, Process]:
 def shape_source(colours: int | None) -> UnknownShape:
     """An unknown shape from the light of some colours, or None from the markers alone."""
     if colours is None:
-        return unknown_shape(lit_bundle(), calibration(), None)
-    settings = JointSettings(gamma=1.0)
-    return unknown_shape(lit_bundle(colours), calibration(), reference().image, settings=settings)
+        return unknown_shape(lit_bundle(), calibration(), None, gel="linear")
+    settings, rest = JointSettings(gamma=1.0), reference().image
+    return unknown_shape(lit_bundle(colours), calibration(), rest, gel="linear", settings=settings)
 
 
 def row(kind: str, name: str, presses: list[Press], process: Process) -> dict[str, Any]:

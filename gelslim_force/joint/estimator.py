@@ -37,6 +37,7 @@ from gelslim_force.joint.refinement import refined
 from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes, rise_of
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.strained_gel import Excess, StrainedGel
 from gelslim_force.motion.marker_motion import MarkerRays, MarkerView
 from gelslim_optics.light.light_law import LightLaw
 from ifem_export.operators.adjoint_fields import rigid_motions
@@ -49,9 +50,9 @@ _MARKER_LIMIT = 3.0
 _LEAST_NODES, _CLOSE = 3, 1
 """The latter: steps about the contact within which heights at half the pitch count."""
 _ROUGH_TOLERANCE = 2e-4  # of forces on the nodes that those at half the pitch follow
-_SETTLED, _FAR = 0.01, 0.2
-"""Relative changes of the force: below the first, another linearisation changes little; above the
-second, since the frame before, the forces on the nodes need another one."""
+_SETTLED, _FAR, _LOST = 0.01, 0.2, 0.03
+"""Shares of the force: another linearisation changes little below the first change; one is needed
+above the second, since the frame before, and above the third, on nodes of a deep contact left."""
 _HELD_SLOPE = 0.07
 """Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
 random contacts then differ from those of another linearisation by 0.03 standard deviations in the
@@ -79,8 +80,7 @@ class JointEstimator:
         settings: What is assumed.
         moved: Finds the region where there is no light.
         off_design: What gel and camera that are not as specified do.
-        strained: Another law of the gel, from motion (c, 3) to forces (c, 3); None for linear.
-        strained_from_mm: Depth from which it is used.
+        strained: The law of the gel in deep contacts; None for a linear gel.
         relief: What the heights of a deep dent do to its light; None without directions of light.
         deep_mm: Depth from which a contact is deep.
         finer: The surface between the nodes, as the light sees it; None for cubic convolution.
@@ -104,8 +104,7 @@ class JointEstimator:
     settings: JointSettings
     moved: MovedRegion | None = None
     off_design: OffDesign | None = None
-    strained: Any = None
-    strained_from_mm: float = 0.0
+    strained: StrainedGel | None = None
     relief: NodeRelief | None = None
     deep_mm: float = math.inf
     finer: FinerSurface | None = None
@@ -136,8 +135,7 @@ class JointEstimator:
         if region.sum() < _LEAST_NODES:
             return None
         if last is None or not (last.region & region).any():
-            still, none = np.zeros_like(self.points_mm), np.zeros(0, dtype=np.intp)
-            start = FitState(still, GelMotion(self.responses, none, still[none], still), 1.0)
+            start = FitState.at_rest(self.responses, len(self.points_mm))
             begun = self._rounds(frame, region, start, self.settings.rounds)
         else:
             begun = last.region, last.state
@@ -155,12 +153,14 @@ class JointEstimator:
         begun = state
         for _ in range(rounds[0]):
             state = self._round(frame, np.flatnonzero(nodes), state)
-        if not state.near(begun, _FAR):
+        if is_far := not state.near(begun, _FAR):
             state = self._round(frame, np.flatnonzero(nodes), state)
         nodes = self._pressing(nodes, state)
-        too_deep = -float(state.near_mm.min(initial=0.0)) > self.finer_to_mm
-        if too_deep or self.deepness(state) > 0:
+        too_deep = state.depth_mm > self.finer_to_mm
+        if too_deep or (self.deepness(state) > 0 and is_far):
             nodes, state = self._rounds(frame, nodes, state, rounds[1:])
+        elif self.deepness(state) > 0 and state.share_beside(nodes) > _LOST:
+            state = self._round(frame, np.flatnonzero(nodes), state)
         return nodes, state if too_deep else refined(self, frame, np.flatnonzero(nodes), state)
 
     def _pressing(self, nodes: Mask, state: FitState) -> Mask:
@@ -238,9 +238,9 @@ class JointEstimator:
 
     def _linearised(self, frame: FrameData, nodes: Nodes, state: FitState) -> Linearised:
         """The data near the contact, linear about the state."""
-        offset, near = self.offset(state), np.zeros(len(self.points_mm), dtype=bool)
+        excess, near = self.excess(state), np.zeros(len(self.points_mm), dtype=bool)
         near[nodes] = True
-        moved = state.linear_mm(nodes, near) + offset
+        moved = state.linear_mm(nodes, near) + excess.moved_mm
         markers = self.marker_rows(frame, near, moved)
         data = NormalEquations.of(3 * len(nodes))
         data = data.with_rows(markers.rows, markers.residual, markers.weight)
@@ -249,7 +249,7 @@ class JointEstimator:
             heights = self.responses.of_heights(nodes, light.nodes)
             data = data.with_light(light, heights, (1 - state.gain, self.settings.gain_sigma))
         start, deep = state.force_n[nodes].ravel(), self.deepness(state)
-        about = nodes, start, moved, offset, state.gain, deep
+        about = nodes, start, moved, excess, state.gain, deep
         return Linearised(*about, data, markers, light, heights)
 
     def _solved(self, data: Linearised) -> FitState:
@@ -268,7 +268,7 @@ class JointEstimator:
         found = equations.solved(data.start, chosen.friction, tolerance)
         force = np.zeros_like(self.points_mm)
         force[nodes] = found.reshape(-1, 3)
-        motion = GelMotion(self.responses, nodes, force[nodes], data.offset_mm)
+        motion = GelMotion(self.responses, nodes, force[nodes], data.excess)
         sums = np.reshape(self.rigid[:, nodes], (6, -1))
         sought = SoughtForces(sums, np.repeat(force[nodes, 2] < 0, 3))
         light, higher = data.light, data.heights_after(found)
@@ -281,13 +281,11 @@ class JointEstimator:
             force, motion, gain, equations, sought, data.markers, left, data, height, light=shown
         )
 
-    def offset(self, state: FitState) -> Array:
-        """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
-        depth = -float(state.near_mm.min(initial=0.0))
-        if self.strained is None or depth <= self.strained_from_mm:
-            return np.zeros_like(state.force_n)
-        moved = state.displacement_mm
-        return np.asarray(moved - self.responses.compliance.whole(self.strained.force(moved)))
+    def excess(self, state: FitState) -> Excess:
+        """What the gel moves further than a linear one in an estimate, after one more step."""
+        if self.strained is None or state.depth_mm <= self.strained.from_mm:
+            return Excess(np.zeros_like(state.force_n))
+        return self.strained.excess(state.displacement_mm, state.force_n, state.motion.excess)
 
     def marker_rows(self, frame: FrameData, near: Mask, moved_mm: Array) -> MarkerRows:
         """The markers near the contact: lateral motion by the picture and the height.

@@ -13,6 +13,7 @@ from gelslim_force.joint.light.view import SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows
 from gelslim_force.joint.normal_equations import Linearised, NormalEquations
 from gelslim_force.joint.responses import Responses
+from gelslim_force.joint.strained_gel import Excess
 from gelslim_force.motion.marker_motion import MarkerRays
 
 Array = NDArray[np.float64]
@@ -47,13 +48,13 @@ class GelMotion:
         responses: Of the gel.
         nodes: (p,) nodes with forces.
         force_n: (p, 3) on them.
-        offset_mm: (c, 3) what a gel that is not linear moves further.
+        excess: What a gel at large strain moves further.
     """
 
     responses: Responses
     nodes: NDArray[np.intp]
     force_n: Array
-    offset_mm: Array
+    excess: Excess
 
     @cached_property
     def linear_mm(self) -> Array:
@@ -68,7 +69,7 @@ class GelMotion:
     @cached_property
     def displacement_mm(self) -> Array:
         """(c, 3) of the gel."""
-        return self.linear_mm + self.offset_mm
+        return self.linear_mm + self.excess.moved_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +115,12 @@ class FitState:
     wider_n: Array | None = None
     light: LightRows | None = None
 
+    @classmethod
+    def at_rest(cls, responses: Responses, nodes: int) -> FitState:
+        """The gel without contact."""
+        still, none = np.zeros((nodes, 3)), np.zeros(0, dtype=np.intp)
+        return cls(still, GelMotion(responses, none, still[none], Excess(still)), 1.0)
+
     @property
     def displacement_mm(self) -> Array:
         """(c, 3) motion of the surface nodes."""
@@ -123,6 +130,11 @@ class FitState:
     def near_mm(self) -> Array:
         """Heights (m,) of the nodes in and around the contact, or of all."""
         return self.displacement_mm[:, 2] if self.height_mm is None else self.height_mm
+
+    @property
+    def depth_mm(self) -> float:
+        """How far the contact is pressed in."""
+        return -float(self.near_mm.min(initial=0.0))
 
     def linear_mm(self, nodes: NDArray[np.intp], near: NDArray[np.bool_]) -> Array:
         """Motion (c, 3) of a linear gel under the forces on some nodes only.
@@ -140,6 +152,11 @@ class FitState:
         if not motion.is_known:
             return move(nodes, self.force_n[nodes])
         return motion.linear_mm - move(others, self.force_n[others])
+
+    def share_beside(self, nodes: Mask) -> float:
+        """Resultant of the forces on all but some nodes (c,), over the whole one."""
+        beside, whole = self.force_n[~nodes].sum(axis=0), self.force_n.sum(axis=0)
+        return float(np.linalg.norm(beside) / max(float(np.linalg.norm(whole)), 1e-12))
 
     def near(self, other: FitState, share: float) -> bool:
         """Whether the resultant differs from another one by less than a share of it."""

@@ -22,6 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 if TYPE_CHECKING:
     from gelslim_force.joint.light.sums import LightSums
     from gelslim_force.joint.marker_rows import MarkerRows
+from gelslim_force.joint.strained_gel import Excess
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
@@ -141,7 +142,7 @@ class Linearised:
         nodes: (p,) those whose forces are sought.
         start: (3p,) their forces to start from.
         moved_mm: (c, 3) motion of the surface in the estimate.
-        offset_mm: (c, 3) by which it differs from that of a linear gel.
+        excess: What of it a linear gel would not move.
         gain: Of the light in the estimate.
         deepness: Of the contact in the estimate.
         equations: Of the data, without a prior.
@@ -156,7 +157,7 @@ class Linearised:
     nodes: Nodes
     start: Array
     moved_mm: Array
-    offset_mm: Array
+    excess: Excess
     gain: float
     deepness: float
     equations: NormalEquations

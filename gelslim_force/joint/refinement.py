@@ -71,8 +71,8 @@ class _Refinement:
         estimator, pressure, parts = self.estimator, self.pressure, self.parts
         responses, nodes, bearing = estimator.responses, parts.nodes, parts.bearing
         before = self._before(state)
-        start, offset = self._on_nodes(before), estimator.offset(state)
-        moved = responses.displacement(bearing, start[bearing]) + offset
+        start, excess = self._on_nodes(before), estimator.excess(state)
+        moved = responses.displacement(bearing, start[bearing]) + excess.moved_mm
         normal = parts.places, parts.normal(before)
         height = pressure.heights(moved[:, 2], (nodes, start[nodes, :2]), normal)
         light = estimator.light_sums(frame, _mask(start, nodes), moved, state, height)
@@ -91,7 +91,7 @@ class _Refinement:
         higher = (heights @ (found - before).astype(heights.dtype)).astype(float)
         return FitState(
             force,
-            GelMotion(responses, bearing, force[bearing], offset),
+            GelMotion(responses, bearing, force[bearing], excess),
             light.gain_after(higher, gain[1]),
             equations,
             self._sought(found, force),

@@ -18,7 +18,7 @@ from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import FoundForces, NormalReading
 from gelslim_force.contact.shading_change import LostColourError
-from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm, law_of
+from gelslim_force.forces.finite_strain import deep_mm, law_of
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator
 from gelslim_force.joint.finer_pressure import FinerPressure
@@ -33,6 +33,7 @@ from gelslim_force.joint.node_relief import NodeRelief
 from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import MARKERS_ALONE, JointSettings
+from gelslim_force.joint.strained_gel import StrainedGel
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.tracking.marker_noise import noise_px
@@ -174,7 +175,7 @@ def unknown_shape(
     calibration: Calibration,
     reference: NDArray[np.uint8] | None,
     *,
-    gel: str = "linear",
+    gel: str = "auto",
     settings: JointSettings | None = None,
     light: LightCalibration | None = None,
     more: Sequence[tuple[Bundle, float]] = (),
@@ -230,8 +231,7 @@ def unknown_shape(
         None if seen is None else LightLaw.of(_traced(bundle), chosen.gamma),
         bundle.material.youngs_modulus_mpa,
         chosen,
-        strained=None if gel == "linear" else FiniteStrainForce(bundle, membranes=skin),
-        strained_from_mm=deep_mm(bundle) if gel == "auto" else 0.0,
+        strained=_strained(bundle, gel),
         relief=None if bare else NodeRelief.of(_traced(bundle), lattice, deep_mm(bundle)),
         deep_mm=math.inf if gel == "linear" else deep_mm(bundle),
         finer=None if finer is None else finer.surface,
@@ -245,6 +245,12 @@ def unknown_shape(
     least = chosen.unseen_by_markers if seen is None else chosen.unseen_force
     unseen_n = least * bundle.material.youngs_modulus_mpa
     return UnknownShape(estimator, followed, unseen_n / layer_stiffness_n_mm(bundle))
+
+
+def _strained(bundle: Bundle, gel: str) -> StrainedGel | None:
+    if gel == "linear":
+        return None
+    return StrainedGel.of(bundle, deep_mm(bundle) if gel == "auto" else 0.0)
 
 
 def _finer_pressure(bundle: Bundle, lattice: NodeLattice) -> FinerPressure:

@@ -158,13 +158,13 @@ class NonlinearContact:
             return whole
         inside, memory = slice(system.columns, -system.columns), Anderson()
         pull = system.surface_to_inner @ u.reshape(-1)
-        whole[inside] = self.law.inner.solve(-pull, self.law.inner_rtol).x.reshape(-1, 3)
+        whole[inside] = self.law.inner_step(-pull).reshape(-1, 3)
         for _ in range(self.law.most_steps):
             force = body.pad.force(whole)
             rest = force[inside].reshape(-1)
             if np.linalg.norm(rest) <= self.law.tolerance * np.linalg.norm(force[body.surface]):
                 break
-            step = self.law.inner.solve(-rest, self.law.inner_rtol).x
+            step = self.law.inner_step(-rest)
             whole[inside] = memory.next(whole[inside].reshape(-1), step).reshape(-1, 3)
         return whole
 

@@ -77,8 +77,8 @@ def opened(by: Compression) -> ForcePipeline:
     rest, bundle = by.of(reference().image), specified_bundle()
     found = calibrate(lit_bundle(), rest)
     gel = built_gel(bundle, found, None, PipelineSettings(gel="auto")).share
-    source = unknown_shape(bundle, found, rest, settings=JointSettings(gamma=1.0))
-    return ForcePipeline(bundle, found, normal=source, gel=gel)
+    source = unknown_shape(bundle, found, rest, gel="linear", settings=JointSettings(gamma=1.0))
+    return ForcePipeline(bundle, found, PipelineSettings(gel="linear"), source, gel)
 
 
 def scores(

@@ -12,20 +12,21 @@ from gelslim_force.joint.settings import WITNESS, JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import indenter_source
+from gelslim_force.settings import PipelineSettings
 
 
 @cache
 def witness(settings: JointSettings = JointSettings()) -> UnknownShape:  # noqa: B008
-    """Forces of an unknown shape; the drawn camera is linear."""
-    linear = replace(settings, gamma=1.0)
-    return unknown_shape(lit_bundle(), calibration(), reference().image, settings=linear)
+    """Forces of an unknown shape; the drawn camera and the drawn gel are linear."""
+    linear, rest = replace(settings, gamma=1.0), reference().image
+    return unknown_shape(lit_bundle(), calibration(), rest, gel="linear", settings=linear)
 
 
 @cache
 def opened(mode: str) -> ForcePipeline:
     """By the mode `unknown`, `none`, `depth` (that the test gives) or the name of an indenter."""
     if mode in ("none", "depth"):
-        return ForcePipeline(lit_bundle(), calibration())
+        return ForcePipeline(lit_bundle(), calibration(), PipelineSettings(gel="linear"))
     if mode == "unknown":
         return opened("none").with_normal(witness())
     source = indenter_source(lit_bundle(), calibration(), reference().image, mode)

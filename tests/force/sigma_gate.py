@@ -40,6 +40,8 @@ COMPONENTS = ("F_x", "F_y", "F_z")
 RMS, COVERAGE = (0.8, 1.3), (0.90, 0.98)
 """What the gate asks for."""
 _95 = 1.959964
+_LINEAR = PipelineSettings(gel="linear")
+"""The law of the gels that the contacts are drawn on."""
 
 
 @dataclass(frozen=True)
@@ -66,21 +68,22 @@ def _nothing_given(wide: bool = False) -> ForcePipeline:
         bundle,
         calibration(),
         reference().image,
+        gel="linear",
         settings=JointSettings(gamma=1.0),
         more=gel.more,
     )
-    return ForcePipeline(bundle, calibration(), normal=source, gel=gel.share)
+    return ForcePipeline(bundle, calibration(), _LINEAR, source, gel.share)
 
 
 @cache
 def _depth_given() -> ForcePipeline:
-    return ForcePipeline(specified_bundle(), calibration(), gel=_gel().share)
+    return ForcePipeline(specified_bundle(), calibration(), _LINEAR, gel=_gel().share)
 
 
 @cache
 def _ball_given(radius_mm: float) -> ForcePipeline:
     source = normal_source(_gel(), reference().image, f"sphere:{radius_mm:g}")
-    return ForcePipeline(specified_bundle(), calibration(), normal=source, gel=_gel().share)
+    return ForcePipeline(specified_bundle(), calibration(), _LINEAR, source, _gel().share)
 
 
 def contact_of(mode: str, seed: int) -> Contact:

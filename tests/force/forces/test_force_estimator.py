@@ -171,6 +171,24 @@ def test_the_law_follows_the_depth(case) -> None:
     assert (law.force(1.01 * unit) == strained.force(1.01 * unit)).all()
 
 
+@pytest.mark.parametrize("steps", [0, 9])
+def test_the_law_of_a_frame_is_that_of_tight_tolerances(case, steps: int) -> None:
+    """In the middle, and where the dent is at the edge, which the infinite pad does not have."""
+    bundle, _, _, moved = case
+    places = np.round(np.asarray(bundle.mesh.surface_mm)[:, :2] / bundle.mesh.cell_size_mm[:2])
+    shifted = places + np.array([steps, 0])
+    gap, source = cKDTree(shifted).query(places)
+    u = np.where((gap < 0.1)[:, None], 0.5 * moved[source], 0.0)
+    exact = FiniteStrainForce(bundle, tolerance=1e-7, inner_rtol=1e-8, most_steps=60).force(u)
+    law = FiniteStrainForce.per_frame(bundle)
+    found = law.held(u)
+    again = law.held(u, law.held(0.9 * u))
+    for force in (found.force_n, again.force_n):
+        assert np.linalg.norm(force - exact) < 0.01 * np.linalg.norm(exact)
+        total = np.linalg.norm(exact.sum(axis=0))
+        assert np.linalg.norm((force - exact).sum(axis=0)) < 0.005 * total
+
+
 @pytest.mark.slow
 def test_neo_hookean_inner_nodes_are_in_balance(case) -> None:
     """Against Newton's method with the exact tangent, to the last digit."""

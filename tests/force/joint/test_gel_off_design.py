@@ -53,6 +53,7 @@ def source(parameter: int | None = None, finer: bool = False) -> UnknownShape:
         bundle,
         calibration(),
         reference().image,
+        gel="linear",
         settings=replace(WIDER if finer else ON_NODES, gamma=1.0),
         more=more() if parameter is None else (),
     )

@@ -135,7 +135,9 @@ def test_what_is_left_unexplained_enters_the_deviation_of_forces() -> None:
     exact = built(gain=even, gamma=1.0, gain_sigma=0.2, light_error=1e-6)
     found = []
     for light in (exact, replace(exact, light_error=0.1), replace(exact, light_error=0.3)):
-        source = unknown_shape(lit_bundle(), calibration(), reference().image, light=light)
+        source = unknown_shape(
+            lit_bundle(), calibration(), reference().image, gel="linear", light=light
+        )
         pipeline = ForcePipeline(lit_bundle(), calibration(), None, source)
         wrench = pipeline.process(pressed(13).image).wrench
         assert wrench is not None

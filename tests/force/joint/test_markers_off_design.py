@@ -40,14 +40,18 @@ def gel() -> BuiltGel:
 
 @cache
 def by_markers() -> UnknownShape:
-    return unknown_shape(specified_bundle(), calibration(), None, more=gel().more)
+    return unknown_shape(specified_bundle(), calibration(), None, gel="linear", more=gel().more)
 
 
 @pytest.mark.slow
 def test_forces_and_deviations_by_the_markers_off_design() -> None:
     """The first contacts of at least 0.1 N from a seed that no choice in the estimate has seen."""
     pipeline = ForcePipeline(
-        specified_bundle(), calibration(), normal=by_markers(), gel=gel().share
+        specified_bundle(),
+        calibration(),
+        PipelineSettings(gel="linear"),
+        by_markers(),
+        gel().share,
     )
     off, sigma, true, unknown = [], [], [], 0
     for seed in islice((s for s in count(FIRST) if -press_force_n(s)[2] >= LEAST_N), CASES):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -28,9 +29,11 @@ from shaded_frames import shaded
 
 from gelslim_force.built_sensor import BuiltGel, built_gel
 from gelslim_force.calibration.file import write_calibration
+from gelslim_force.forces.finite_strain import FiniteStrainForce, HeldPad
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.settings import ON_NODES, JointSettings
+from gelslim_force.joint.strained_gel import StrainedGel
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.presses.gel_calibration import specified_gel
@@ -42,6 +45,8 @@ from ifem_export.operators.solver import ConvergenceError
 
 Array = NDArray[np.float64]
 LINEAR_CAMERA = JointSettings(gamma=1.0)
+LINEAR_GEL = PipelineSettings(gel="linear")
+"""As the presses are drawn."""
 
 
 def pipeline(sources: int = 2, gamma: float = 1.0) -> ForcePipeline:
@@ -54,9 +59,10 @@ def made(sources: int, gamma: float) -> ForcePipeline:
         lit_bundle(sources),
         calibration(),
         reference().image,
+        gel="linear",
         settings=replace(LINEAR_CAMERA, gamma=gamma),
     )
-    return ForcePipeline(lit_bundle(sources), calibration(), normal=source)
+    return ForcePipeline(lit_bundle(sources), calibration(), LINEAR_GEL, source)
 
 
 def processed(image: NDArray[np.uint8], sources: int = 2, gamma: float = 1.0) -> FrameResult:
@@ -118,10 +124,11 @@ def test_a_finer_pressure_is_fitted_unless_it_is_not_wanted() -> None:
     for asked in (False, True):
         made = unknown_source(sensor, camera, rest, PipelineSettings(finer_pressure=asked))
         assert (made.estimator.pressure is not None) == asked
-    source = unknown_shape(sensor, camera, rest, settings=replace(ON_NODES, gamma=1.0))
+    nodes = replace(ON_NODES, gamma=1.0)
+    source = unknown_shape(sensor, camera, rest, gel="linear", settings=nodes)
     truth = pressed(13)
     finer = processed(truth.image)
-    plain = ForcePipeline(sensor, camera, normal=source).process(truth.image)
+    plain = ForcePipeline(sensor, camera, LINEAR_GEL, source).process(truth.image)
     assert finer.wrench is not None
     assert plain.wrench is not None
     off = np.abs(finer.wrench.vector - truth.wrench)
@@ -142,7 +149,7 @@ def test_forces_change_with_poissons_ratio_as_their_derivative_says() -> None:
     gel_change = ComplianceChange.of(lit_bundle(), [(varied, step)])
     designed = replace(designed, off_design=OffDesign(gel_change, to_markers, designed.by_height))
     camera, rest = calibration(), reference().image
-    other = unknown_shape(varied, camera, rest, settings=LINEAR_CAMERA).estimator
+    other = unknown_shape(varied, camera, rest, gel="linear", settings=LINEAR_CAMERA).estimator
     places_px = view.camera.project(view.rest_mm + to_markers @ truth.moved_mm)
     found, changed = (e.estimate(e.frame(truth.image, places_px, 0.005)) for e in (designed, other))
     assert found is not None
@@ -207,12 +214,13 @@ def test_a_gain_off_by_a_fifth_costs_little() -> None:
 
 def test_a_law_that_fails_gives_a_reason_and_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
     class Failing:
-        def force(self, displacement_mm: Array) -> Array:
+        def held(self, displacement_mm: Array, near: HeldPad | None) -> HeldPad:
             raise ConvergenceError("no balance")
 
     source = pipeline().normal
     assert isinstance(source, UnknownShape)
-    strained = replace(source.estimator, strained=Failing())
+    gel = StrainedGel(cast(FiniteStrainForce, Failing()), lambda force_n: force_n, 0.0)
+    strained = replace(source.estimator, strained=gel)
     monkeypatch.setattr(source, "estimator", strained)
     found = processed(pressed(13).image)
     assert not found.normal_known
@@ -323,7 +331,7 @@ def test_deviations_hold_for_gels_and_lights_within_their_tolerances() -> None:
     assert share is not None
     source = pipeline().normal
     assert isinstance(source, UnknownShape)
-    first = ForcePipeline(bundle, calibration(), normal=source, gel=share)
+    first = ForcePipeline(bundle, calibration(), LINEAR_GEL, source, share)
     scores, errors = [], []
     for seed in range(60):
         truth = pressed(seed)

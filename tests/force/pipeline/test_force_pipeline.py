@@ -30,7 +30,10 @@ def frames():
 
 
 def pipeline(calibration, **settings) -> ForcePipeline:
-    return ForcePipeline(sensor_bundle(), calibration, PipelineSettings(**settings))
+    """The frames are drawn on a linear gel."""
+    return ForcePipeline(
+        sensor_bundle(), calibration, PipelineSettings(**{"gel": "linear", **settings})
+    )
 
 
 def last(chain: ForcePipeline, frames, normal: bool = True):

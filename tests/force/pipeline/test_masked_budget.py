@@ -32,7 +32,7 @@ def sensor() -> Bundle:
 
 @pytest.fixture(scope="module", params=[None, Budget(0.011)])
 def estimators(sensor: Bundle, request: pytest.FixtureRequest) -> ContactForces:
-    settings = PipelineSettings(budget=request.param)
+    settings = PipelineSettings(budget=request.param, gel="linear")
     return settings.contact_forces(sensor, settings.operator(sensor), None)
 
 

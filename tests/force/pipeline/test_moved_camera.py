@@ -21,7 +21,9 @@ FORCE_N = np.array([*SHEAR_N, -NORMAL_N])
 
 @pytest.fixture(scope="module")
 def opened() -> ForcePipeline:
-    return ForcePipeline(sensor_bundle(), calibrate(sensor_bundle(), frame(0.0).image))
+    """The frames are drawn on a linear gel."""
+    built = calibrate(sensor_bundle(), frame(0.0).image)
+    return ForcePipeline(sensor_bundle(), built, PipelineSettings(gel="linear"))
 
 
 @pytest.fixture
@@ -58,7 +60,7 @@ def test_small_drift_is_no_force(chain: ForcePipeline, shift, scale: float) -> N
     off, score = scores(chain, picture(0.0, shift, scale), 0.0)
     assert np.abs(score).max() < 3
     assert np.abs(off).max() < 0.003
-    settings = PipelineSettings(drift=DriftSettings(correct=False))
+    settings = PipelineSettings(gel="linear", drift=DriftSettings(correct=False))
     blind = ForcePipeline(sensor_bundle(), chain.calibration, settings)
     result = blind.process(picture(0.0, shift, scale))
     assert np.abs(result.wrench.force_n[:2]).max() > 0.05

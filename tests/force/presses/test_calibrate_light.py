@@ -29,6 +29,7 @@ from gelslim_force.presses.load_table import Load
 from gelslim_force.presses.press_error import PressError
 from gelslim_force.presses.press_model import PressModel
 from gelslim_force.presses.seen_press import PressView
+from gelslim_force.settings import PipelineSettings
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 
@@ -104,8 +105,10 @@ def test_a_hidden_light_is_found_and_explains_other_presses() -> None:
     assert "p9.png" in page
     bundle, camera = ball_bundle(0.3223), ball_calibration()
     sources = {
-        "traced": unknown_shape(bundle, camera, rest_picture(), settings=JointSettings(gamma=1.0)),
-        "built": unknown_shape(bundle, camera, rest_picture(), light=found),
+        "traced": unknown_shape(
+            bundle, camera, rest_picture(), gel="linear", settings=JointSettings(gamma=1.0)
+        ),
+        "built": unknown_shape(bundle, camera, rest_picture(), gel="linear", light=found),
     }
     other = replace(hidden, ball_mm=5.0)
     rng = np.random.default_rng(3)
@@ -114,7 +117,8 @@ def test_a_hidden_light_is_found_and_explains_other_presses() -> None:
         load = rng.uniform(0.15, 0.5)
         picture = ball_picture(other, load, rng.uniform(-6, 6, 2), 5000 + number)
         for name, source in sources.items():
-            result = ForcePipeline(bundle, camera, None, source).process(picture)
+            linear = PipelineSettings(gel="linear")
+            result = ForcePipeline(bundle, camera, linear, source).process(picture)
             assert result.normal_known
             assert result.wrench is not None
             assert abs(result.wrench.force_n[2] + load) < 0.12 * load

@@ -55,7 +55,7 @@ def force(
     method: option.Method = "auto",
     compensation: option.Compensation = "exact",
     interpolation: option.Interpolation = "sparse",
-    gel: option.GelLaw = "linear",
+    gel: option.GelLaw = "auto",
     finer_pressure: option.FinerPressure = True,
     friction: option.Friction = 1.0,
     drift: option.Drift = "correct",
@@ -224,9 +224,8 @@ def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
     if timed.ladder is not None:
         choice = timed.ladder.choose(budget)
         if gel != "linear":
-            remark = (
-                f"the ladder was measured on a linear gel, so its errors are not those of {gel}"
-            )
+            where = "deep contacts" if gel == "auto" else "this gel"
+            remark = f"the ladder was measured on a linear gel; its errors are not those of {where}"
             choice = replace(choice, remarks=(*choice.remarks, remark))
         here = choice.rung.name in read_times(sensor.times_key)
         note_choice(choice, budget, here, f"gelslim bench {path}")
