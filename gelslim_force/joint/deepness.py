@@ -36,17 +36,29 @@ def settings_at(settings: JointSettings, deep: float) -> JointSettings:
     return replace(settings, light_share=light, least_pressure=least)
 
 
-def roughness_mpa(
-    settings: JointSettings, deep: float, youngs_modulus_mpa: float, pressure_mpa: Array
-) -> float:
-    """Standard deviation of the difference of the traction of neighbouring nodes.
+def traction_sigma_mpa(
+    settings: JointSettings, deep: float, youngs_modulus_mpa: float, traction_mpa: Array
+) -> tuple[float, float]:
+    """Standard deviations of what tractions are assumed to be.
 
     Args:
         settings: Has the shares of the modulus and of the mean pressure.
         deep: As `deepness` gives it.
         youngs_modulus_mpa: Of the gel.
-        pressure_mpa: (p,) of the nodes; the mean is weighted by the pressure itself.
+        traction_mpa: (p, 3) present ones of the nodes; means are weighted by the pressure.
+
+    Returns:
+        That of the difference of the tractions of neighbouring nodes, and that of tangential
+        tractions.
     """
-    pressing = np.maximum(pressure_mpa, 0.0)
-    mean = float(pressing @ pressing / max(float(pressing.sum()), 1e-12))
-    return max(settings.roughness * youngs_modulus_mpa, settings.deep_roughness * deep * mean)
+    pressing = np.maximum(-traction_mpa[:, 2], 0.0)
+    whole = max(float(pressing.sum()), 1e-12)
+    mean = float(pressing @ pressing) / whole
+    sheared = mean * float(np.linalg.norm(traction_mpa[:, :2].sum(axis=0))) / whole
+    return (
+        max(settings.roughness * youngs_modulus_mpa, settings.deep_roughness * deep * mean),
+        max(
+            settings.tangential_stress * youngs_modulus_mpa,
+            settings.shear_share * sheared,
+        ),
+    )

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gelslim_force.joint.deepness import deepness, roughness_mpa, settings_at
+from gelslim_force.joint.deepness import deepness, settings_at, traction_sigma_mpa
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces, SoughtForces
@@ -256,13 +256,15 @@ class JointEstimator:
         """The forces that the linear data and the prior give."""
         chosen, nodes, young = self.settings, data.nodes, self.youngs_modulus_mpa
         area = self.area_mm2[nodes]
+        traction = data.start.reshape(-1, 3) / area[:, None]
+        rough, tangential = traction_sigma_mpa(chosen, data.deepness, young, traction)
         equations = data.equations.with_prior(
             data.start,
             self.lattice.adjacent(nodes),
             area,
-            roughness_mpa(chosen, data.deepness, young, -data.start[2::3] / area),
+            rough,
             chosen.normal_stress * young,
-            chosen.tangential_stress * young,
+            tangential,
         )
         tolerance = TOLERANCE if self.pressure is None else _ROUGH_TOLERANCE
         found = equations.solved(data.start, chosen.friction, tolerance)

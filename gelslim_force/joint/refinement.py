@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.joint.deepness import roughness_mpa
+from gelslim_force.joint.deepness import traction_sigma_mpa
 from gelslim_force.joint.finer_pressure import FinerPressure, PressureParts
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, SoughtForces
 from gelslim_force.joint.light.rows import LightRows
@@ -129,19 +129,19 @@ class _Refinement:
 
         estimator, parts, nodes = self.estimator, self.parts, self.parts.nodes
         chosen, young, area = estimator.settings, estimator.youngs_modulus_mpa, estimator.area_mm2
-        mean = -state.force_n[nodes, 2] / area[nodes]
-        rough = roughness_mpa(chosen, estimator.deepness(state), young, mean)
+        mean = state.force_n[nodes] / area[nodes, None]
+        rough, tangential = traction_sigma_mpa(chosen, estimator.deepness(state), young, mean)
         hessian, slope = equations.hessian.copy(), equations.slope.copy()
         # Inside, a place has a quarter of the area of a node.
         share = self.pressure.between(parts.places, area) / 4
         at, size = self.pressure.surface.lattice.place[parts.places], _SIZES * chosen.normal_stress
         given = rough, size * young, parts.source, parts.normal(before), hessian, slope
         add_smoothness(at, share, *given)
-        at, size = estimator.lattice.place[nodes], chosen.tangential_stress
+        at = estimator.lattice.place[nodes]
         for axis in (0, 1):
             own = parts.tangential[axis::2]
             alone = np.repeat(own[:, None], 4, axis=1)
-            given = rough, size * young, alone, before[own], hessian, slope
+            given = rough, tangential, alone, before[own], hessian, slope
             add_smoothness(at, area[nodes], *given)
         return NormalEquations(hessian, slope)
 

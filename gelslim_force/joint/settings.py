@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from gelslim_force.joint.light.calibration import LightCalibration
 
 
+USUAL_CELL = 0.4
+"""Side of a cell over the thickness, for which nodal limits and reaches are stated."""
+
+
 @dataclass(frozen=True)
 class JointSettings:
     """Weights of the data and of what is known beforehand.
@@ -44,6 +48,9 @@ class JointSettings:
             has a steeper rim. It grows from 0 as `deep_light_share`; the larger of the two counts.
         normal_stress: Size of the pressure.
         tangential_stress: Size of the tangential traction.
+        shear_share: The same over the present mean traction of the contact along the surface; the
+            larger of the two counts. With a narrow limit a strongly sheared contact is explained by
+            a deeper one with less shear.
         unseen_force: Normal force of a contact that the light may not show, over Young's modulus,
             in mm². On drawn pictures contacts of half this force are not seen, and those of twice
             it are.
@@ -83,6 +90,7 @@ class JointSettings:
     deep_roughness: float = 2.0
     normal_stress: float = 1.4
     tangential_stress: float = 0.07
+    shear_share: float = 1.5
     unseen_force: float = 0.2
     unseen_by_markers: float = 0.5
     most_sigma: float = 0.4
@@ -106,6 +114,25 @@ class JointSettings:
             gamma=light.gamma,
             gain_sigma=light.gain_sigma,
             light_error=math.hypot(self.light_error, light.light_error),
+        )
+
+    def on_mesh(self, share: float) -> JointSettings:
+        """The settings for a mesh, whatever the size of its cells.
+
+        A traction that is limited in size from node to node is so in its integral over the area.
+        Reaches in steps of the nodes are lengths.
+
+        Args:
+            share: Side of a cell over the thickness of the gel.
+        """
+        finer = USUAL_CELL / share
+        return replace(
+            self,
+            normal_stress=finer * self.normal_stress,
+            tangential_stress=finer * self.tangential_stress,
+            shear_share=finer * self.shear_share,
+            light_reach=max(1, round(finer * self.light_reach)),
+            marker_reach=max(1, round(finer * self.marker_reach)),
         )
 
     def __post_init__(self) -> None:

@@ -201,6 +201,7 @@ def unknown_shape(
     """
     gel = law_of(bundle, gel)
     chosen = settings or (MARKERS_ALONE if reference is None else JointSettings())
+    chosen = chosen.on_mesh(_cell_share(bundle))
     if light is not None:
         chosen = chosen.with_light(light)
     followed, skin = calibration.reference, bundle.membranes
@@ -257,6 +258,12 @@ def _finer_pressure(bundle: Bundle, lattice: NodeLattice) -> FinerPressure:
     layers = EndlessLayers.of(bundle)
     surface = FinerSurface.of(lattice, finer_response(bundle, layers))
     return FinerPressure.of(surface, half_step_response(bundle, layers))
+
+
+def _cell_share(bundle: Bundle) -> float:
+    """Side of a cell over the thickness of the gel."""
+    x, y, z = bundle.mesh.cell_size_mm
+    return (x + y) / (2 * z * bundle.mesh.layers)
 
 
 def _traced(bundle: Bundle) -> LightMap:

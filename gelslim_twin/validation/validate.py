@@ -73,18 +73,19 @@ class Chain:
     """It does not take crowned pads and cut cells."""
 
 
-_PAPER = PipelineSettings(
-    rung="paper", compensation="printed", force=ForceSettings(method="direct")
+_LINEAR, _STRAINED = PipelineSettings(gel="linear"), PipelineSettings(gel="neo_hookean")
+_PAPER = replace(
+    _LINEAR, rung="paper", compensation="printed", force=ForceSettings(method="direct")
 )
 CHAINS: tuple[Chain, ...] = (
-    Chain("ours, contact known", PipelineSettings(), "contact"),
-    Chain("ours, depth known", PipelineSettings(), "depth"),
-    Chain("ours, depth, neo-Hookean", PipelineSettings(gel="neo_hookean"), "depth", True),
-    Chain("ours, shape known", PipelineSettings(), "shape"),
-    Chain("ours, shape, neo-Hookean", PipelineSettings(gel="neo_hookean"), "shape", True),
-    Chain("ours, nothing known", PipelineSettings(), "light"),
-    Chain("ours, nothing, neo-Hookean", PipelineSettings(gel="neo_hookean"), "light", True),
-    Chain("ours, tangential", PipelineSettings(), "nothing"),
+    Chain("ours, contact known", _LINEAR, "contact"),
+    Chain("ours, depth known", _LINEAR, "depth"),
+    Chain("ours, depth, neo-Hookean", _STRAINED, "depth", True),
+    Chain("ours, shape known", _LINEAR, "shape"),
+    Chain("ours, shape, neo-Hookean", _STRAINED, "shape", True),
+    Chain("ours, nothing known", _LINEAR, "light"),
+    Chain("ours, nothing, neo-Hookean", _STRAINED, "light", True),
+    Chain("ours, tangential", _LINEAR, "nothing"),
     Chain("paper, depth known", _PAPER, "depth", True),
     Chain("paper, shape known", _PAPER, "cap", True),
 )

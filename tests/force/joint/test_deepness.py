@@ -11,10 +11,10 @@ from pressed_samples import light_map
 from sensor_samples import sensor_bundle
 
 from gelslim_force.forces.finite_strain import law_of
-from gelslim_force.joint.deepness import FULLY, deepness, roughness_mpa, settings_at
+from gelslim_force.joint.deepness import FULLY, deepness, settings_at, traction_sigma_mpa
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
-from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.settings import USUAL_CELL, JointSettings
 from gelslim_optics.light.light_law import SCATTERED, LightLaw
 from gelslim_optics.light.light_map import LightMap, light_arrays
 
@@ -32,10 +32,26 @@ def test_settings_of_shallow_contacts_are_those_given() -> None:
     half = settings_at(chosen, 0.5)
     mean = (chosen.light_share + chosen.deep_light_share) / 2
     assert half.light_share == pytest.approx(mean)
-    pressure = np.array([0.3, 0.1, -0.2])
-    assert roughness_mpa(chosen, 0.0, 0.1, pressure) == pytest.approx(0.1 * chosen.roughness)
-    expected = chosen.deep_roughness * (0.3**2 + 0.1**2) / 0.4
-    assert roughness_mpa(chosen, 1.0, 0.1, pressure) == pytest.approx(expected)
+    traction = np.array([[0.0, 0.0, -0.3], [0.0, 0.0, -0.1], [0.0, 0.0, 0.2]])
+    usual = 0.1 * chosen.roughness, 0.1 * chosen.tangential_stress
+    assert traction_sigma_mpa(chosen, 0.0, 0.1, traction) == pytest.approx(usual)
+    mean = (0.3**2 + 0.1**2) / 0.4
+    rough, _ = traction_sigma_mpa(chosen, 1.0, 0.1, traction)
+    assert rough == pytest.approx(chosen.deep_roughness * mean)
+    traction[:, :2] = [[0.12, 0.0], [0.0, 0.16], [0.0, 0.0]]
+    _, tangential = traction_sigma_mpa(chosen, 0.0, 0.1, traction)
+    assert tangential == pytest.approx(chosen.shear_share * mean * 0.2 / 0.4)
+
+
+def test_limits_and_reaches_are_those_of_an_area_and_of_lengths() -> None:
+    """Twice as fine: a quarter of the area for each node, and twice as many steps."""
+    usual = JointSettings()
+    assert usual.on_mesh(USUAL_CELL) == usual
+    finer = usual.on_mesh(USUAL_CELL / 2)
+    for name in ("normal_stress", "tangential_stress", "shear_share"):
+        assert getattr(finer, name) == pytest.approx(2 * getattr(usual, name))
+    assert (finer.light_reach, finer.marker_reach) == (4, 12)
+    assert finer.roughness == usual.roughness
 
 
 def test_light_with_relief_is_the_derivative_of_its_value() -> None:
