@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import sys
 from collections.abc import Mapping, Sequence
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,12 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.bench_data import ROOT, write_data
+from bench.bench_data import see_tests, write_data
 from bench.rigs.machine import machine
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
-TESTS = ROOT / "tests"
 SEED = 11
 SAMPLES, HELD_OUT = (600, 150), 100
 GAINS = (0.6, 1.0, 1.5, 2.2, 3.2)
@@ -55,7 +53,7 @@ def main() -> None:
     argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     ).parse_args()
-    sys.path[:0] = [str(TESTS / "twin"), str(TESTS / "force"), str(TESTS / "force" / "real_frames")]
+    see_tests("twin", "force", "force/real_frames")
     from real_looks import picture, seen
 
     rest, grid = seen("gelslim3/reference.jpg")
