@@ -151,7 +151,7 @@ def contact_of(residuals: ResidualField) -> ResidualBump | None:
 
 
 def require_no_contact(residuals: ResidualField) -> None:
-    """Reject a picture whose dots are displaced in groups. Raises CalibrationError."""
+    """Reject a picture in which neighbouring dots move together. Raises CalibrationError."""
     bump = contact_of(residuals)
     if bump is not None:
         raise CalibrationError(
