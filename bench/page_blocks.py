@@ -19,7 +19,7 @@ from typing import Any
 
 from bench.bench_data import DOCS, ROOT, write_whole
 from bench.force import compressed_pictures, force_sigma
-from bench.learning import data_set_cost, learned_forces, real_locations
+from bench.learning import data_set_cost, data_set_workers, learned_forces, real_locations
 from bench.page import (
     drawn_light_table,
     force_tables,
@@ -81,7 +81,10 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "twin-look": _from("twin_look", twin_look.table),
         "drawn-light": _from("drawn_light", drawn_light_table.table),
     },
-    "docs/data_sets.md": {"data-set-cost": _from("data_set_cost", data_set_cost.table)},
+    "docs/data_sets.md": {
+        "data-set-workers": _from("data_set_workers", data_set_workers.table),
+        "data-set-cost": _from("data_set_cost", data_set_cost.table),
+    },
     "docs/train.md": {
         "learned-forces": _from("learned_forces", learned_forces.table),
         "real-locations": _from("real_locations", real_locations.table),

@@ -161,8 +161,8 @@ def data_set(
         budget: Error and time allowed; replaces the tolerance of the scene.
         count: Number of samples.
         file_format: `folder`, `webdataset`, `zarr` or `lerobot`.
-        pictures: `png`, `webp` or `jpeg`.
-        quality: 1 to 100 of WebP and JPEG; WebP is lossless at 100.
+        pictures: `png`, `webp` or `jpeg`; `video` for `lerobot` alone.
+        quality: 1 to 100 of WebP, JPEG and video; WebP and video are lossless at 100.
         frames: `last`, `all` or `every:K`.
         jobs: Number of processes.
         scheduler: Address of a Dask scheduler, in place of processes.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import platform
@@ -45,13 +44,6 @@ for name in sys.argv[1:]:
         found[name] = f"{type(error).__name__}: {error}"
     print(json.dumps(found), flush=True)
 """
-GL_LIBRARIES = {
-    "libGL.so.1": "libgl1",
-    "libEGL.so.1": "libegl1",
-    "libX11.so.6": "libx11-6",
-    "libXrender.so.1": "libxrender1",
-}
-"""Libraries that CAD and rendering load on Linux, with the Debian package of each."""
 _DRAW = """
 import numpy as np
 from gelslim_cad.pictures.finger_pictures import picture_whole
@@ -211,21 +203,6 @@ def _in_another_process(code: str, *arguments: str) -> subprocess.CompletedProce
         timeout=LIMIT_S,
         check=False,
     )
-
-
-def missing_graphics() -> tuple[tuple[str, str], ...]:
-    """Return the shared libraries that do not load with their Debian packages (on Linux)."""
-    if not sys.platform.startswith("linux"):
-        return ()
-    return tuple((lib, package) for lib, package in GL_LIBRARIES.items() if not _loads(lib))
-
-
-def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
 
 
 def drawing() -> str:

@@ -236,12 +236,7 @@ def make_bundle(
         gel_material(spec),
         spec.mesh.element,
         marker_positions_mm=grid.positions_mm,
-        marker_arrays={
-            "row": grid.row,
-            "column": grid.column,
-            "diameter_mm": grid.diameter_mm,
-            "kind": np.asarray(grid.kind),
-        },
+        marker_arrays=grid.labels,
         camera=camera_record(d),
         spec_hash=spec_hash(spec),
         with_stiffness=with_stiffness,

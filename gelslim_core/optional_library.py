@@ -43,7 +43,7 @@ EXTRAS = (
         "Parquet tables, data sets for learning, ROS 2 recordings",
     ),
     Extra("rerun", ("rerun",), "force --rerun: recordings for the Rerun viewer"),
-    Extra("cluster", ("distributed",), "explore --scheduler: designs on a Dask cluster"),
+    Extra("cluster", ("distributed",), "--scheduler: designs and data sets on a Dask cluster"),
     Extra("export", ("safetensors",), "bundle-export to safetensors"),
     Extra("zarr", ("zarr",), "dataset --format zarr: data sets as Zarr arrays"),
     Extra(

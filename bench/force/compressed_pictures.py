@@ -10,14 +10,14 @@ tests/force/sigma_cases.py, and the pipelines those of tests/force/compressed_ga
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench.bench_data import DOCS, ROOT, write_data
+from bench.bench_data import DOCS, see_tests, write_data
+from bench.rigs.force_scores import recorded
 from bench.rigs.machine import machine
 
 Record = Mapping[str, Any]
@@ -46,9 +46,7 @@ def scored(count: int, kept: Path) -> dict[str, dict[str, Any]]:
         count: Number of presses.
         kept: Folder that keeps them.
     """
-    folder = str(ROOT / "tests" / "force")
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
+    see_tests("force")
     from compressed_gate import COMPRESSIONS, NONE, scores
 
     rows: dict[str, dict[str, Any]] = {}
@@ -56,23 +54,11 @@ def scored(count: int, kept: Path) -> dict[str, dict[str, Any]]:
         both = {"all": scores(by, by, range(count), kept)}
         if by != NONE:
             both["frames"] = scores(by, NONE, range(count), kept)
-        rows[by.name] = {key: _plain(some) for key, some in both.items()}
+        rows[by.name] = {
+            key: recorded(map(vars, some), ("true", "error", "sigma")) for key, some in both.items()
+        }
         print(by.name, flush=True)
     return rows
-
-
-def _plain(some: list[Any]) -> Record:
-    given = [s for s in some if s.error_n]
-    return {
-        "refused": len(some) - len(given),
-        "true_mn": [[_short(1000 * v) for v in s.true_n] for s in given],
-        "error_mn": [[_short(1000 * v) for v in s.error_n] for s in given],
-        "sigma_mn": [[_short(1000 * v) for v in s.sigma_n] for s in given],
-    }
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.4g}")
 
 
 def table(record: Record) -> str:

@@ -7,6 +7,7 @@ Nothing is given but the pictures; the deviations hold the tolerances of the gel
 
 from __future__ import annotations
 
+import argparse
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,9 @@ MODULUS_SHARE, THICKNESS_SHARE, RATIO = 0.03, 0.015, 0.004
 
 def main() -> None:
     """Push in steps, draw the last, print what it says beside the truth."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     rig = large_rig()
     draw = rig.renderer(replace(FRAMES_LOOK, exposure=Exposure(gamma=1.8)))
     rest = draw.frame().image

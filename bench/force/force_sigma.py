@@ -17,7 +17,6 @@ from __future__ import annotations
 import argparse
 import io
 import json
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from bench.bench_data import DOCS, ROOT, write_data, write_whole
+from bench.bench_data import DOCS, see_tests, write_data, write_whole
+from bench.rigs.force_scores import four_digits, recorded
 from bench.rigs.machine import machine
 from gelslim_core.jobs import Engine
 
@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 Record = Mapping[str, Any]
 SLICE, DEEP_SLICE = 10, 9
 KEPT = Path("out") / "force_sigma"
+ERRORS = ("error", "sigma")
 COMPONENTS = ("F_x", "F_y", "F_z")
 COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57")
 SIZE_IN, DPI = (11.5, 3.6), 110
@@ -53,7 +54,7 @@ def main() -> None:
     parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder like docs")
     options = parser.parse_args()
-    _see_tests()
+    see_tests("force")
     stored = options.docs / "data" / "force_sigma.json"
     if not options.figure:
         data = measured(options, stored)
@@ -116,14 +117,14 @@ def scored(options: argparse.Namespace, modes: tuple[str, ...]) -> dict[str, Any
             for name, every in json.loads(_path(some, mode).read_text("utf-8")).items():
                 rows[mode][name] += every
     return {
-        mode: {name: _condition(every) for name, every in some.items()}
+        mode: {name: recorded(every, ERRORS) for name, every in some.items()}
         for mode, some in rows.items()
     }
 
 
 def score_slice(some: Slice) -> None:
     """Write the scores of a slice, mode by mode, where they are not kept."""
-    _see_tests()
+    see_tests("force")
     from sigma_gate import scores
 
     for mode in some.modes:
@@ -157,40 +158,19 @@ def deep_scored(processes: int) -> dict[str, Any]:
         some = [score for part in own for score in part]
         parts = {"relative": some, "relative_held_out": some[SEEN:]}
         errors = {
-            name: {key: _short(value) for key, value in deep_summary(part).items()}
+            name: {key: four_digits(value) for key, value in deep_summary(part).items()}
             for name, part in parts.items()
         }
-        found[law] = {**_condition(vars(s.score) for s in some), **errors}
+        found[law] = {**recorded((vars(s.score) for s in some), ERRORS), **errors}
     return found
 
 
 def score_deep_slice(some: DeepSlice) -> tuple[Any, ...]:
     """The scores of some deep contacts."""
-    _see_tests()
+    see_tests("force")
     from deep_gate import deep_scores
 
     return deep_scores(some.law, some.seeds)
-
-
-def _see_tests() -> None:
-    """The contacts are those of the tests."""
-    folder = str(ROOT / "tests" / "force")
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
-
-
-def _condition(rows: Iterable[Record]) -> dict[str, Any]:
-    every = list(rows)
-    given = [row for row in every if row["error_n"]]
-    return {
-        "refused": len(every) - len(given),
-        "error_mn": [[_short(1000 * value) for value in row["error_n"]] for row in given],
-        "sigma_mn": [[_short(1000 * value) for value in row["sigma_n"]] for row in given],
-    }
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.4g}")
 
 
 def table(record: Record) -> str:

@@ -12,7 +12,6 @@ those of a ball. Every source sees the same pictures. Set OMP_NUM_THREADS=1.
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,12 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.bench_data import DOCS, ROOT, write_data
+from bench.bench_data import DOCS, see_tests, write_data
 from bench.rigs.force_rig import SEED
 from bench.rigs.machine import machine
 
-TESTS = ROOT / "tests"
-sys.path[:0] = [str(TESTS), str(TESTS / "force")]
+see_tests("force")
 
 from pressed_samples import (  # noqa: E402
     FRICTION,

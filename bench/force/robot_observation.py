@@ -5,6 +5,7 @@ python -m bench.force.robot_observation    # writes docs/images/robot_observatio
 
 from __future__ import annotations
 
+import argparse
 import io
 
 import numpy as np
@@ -26,6 +27,9 @@ LONGEST_MM = 4.0
 
 def main() -> None:
     """Push in steps, and draw the features of the last picture."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     rig = large_rig()
     draw = rig.renderer()
     pipeline = ForcePipeline(rig.bundle, calibrate(rig.bundle, draw.frame().image))

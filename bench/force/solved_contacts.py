@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import argparse
 import io
-import sys
 from pathlib import Path
 
 import numpy as np
 
-from bench.bench_data import ROOT, write_whole
+from bench.bench_data import see_tests, write_whole
 
 KEPT = Path("out") / "deep_contacts"
 
@@ -27,7 +26,7 @@ def main() -> None:
     )
     parser.add_argument("--kept", type=Path, default=KEPT, help="folder for solved contacts")
     options = parser.parse_args()
-    sys.path.insert(0, str(ROOT / "tests" / "force"))
+    see_tests("force")
     from deep_contacts import COUNT, STORED, DeepContact, deep_case, pack, solve
 
     options.kept.mkdir(parents=True, exist_ok=True)

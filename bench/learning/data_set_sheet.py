@@ -5,6 +5,7 @@ python -m bench.learning.data_set_sheet            # writes docs/images/data_set
 
 from __future__ import annotations
 
+import argparse
 import io
 import re
 from pathlib import Path
@@ -22,6 +23,10 @@ SIZE, BAND_PX, COLUMNS, COUNT = (240, 180), 20, 4, 12
 
 
 def main() -> None:
+    """Make the data set and write the sheet."""
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     page = (DOCS / "data_sets.md").read_text(encoding="utf-8")
     scene = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)[0]
     with TemporaryDirectory() as folder:

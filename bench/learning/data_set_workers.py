@@ -16,17 +16,18 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from typing import Any
-
-import psutil
+from typing import TYPE_CHECKING, Any
 
 from bench.bench_data import DOCS, write_data
 from bench.rigs.machine import machine
+
+if TYPE_CHECKING:
+    import psutil  # comes with Dask; the tables of the pages are made without
 
 SCENE = DOCS.parent / "designs" / "scenes" / "shear_sphere.yaml"
 FRAMES = 31
@@ -42,23 +43,52 @@ def main() -> None:
     parser.add_argument("--docs", type=Path, help="folder like docs to write to")
     asked = parser.parse_args()
     size = asked.samples, asked.frames_per_shard
-    runs, ratios = [], []
+    runs = []
     with TemporaryDirectory() as place:
         made(Path(place), 2, (4, FRAMES))  # the compliance, and compiled kernels
         for pair in range(asked.pairs):
             order = (1, 2) if pair % 2 else (2, 1)
-            pair_runs = {workers: made(Path(place), workers, size) for workers in order}
-            ratios.append(pair_runs[1]["wall_s"] / pair_runs[2]["wall_s"])
-            runs += pair_runs.values()
-    frames = asked.samples * FRAMES
-    print(f"{frames} frames: two workers are {median(ratios):.2f} times as fast")
+            runs += [made(Path(place), workers, size) for workers in order]
+    found = {"frames": asked.samples * FRAMES, "frames_per_shard": size[1], "runs": runs}
+    data = {**machine(), **found, "ratio": median(ratios(runs))}
+    print(table(data))
     if asked.docs:
-        found = {"frames": frames, "frames_per_shard": size[1], "ratio": median(ratios)}
-        write_data("data_set_workers", {**machine(), **found, "runs": runs}, asked.docs)
+        write_data("data_set_workers", data, asked.docs)
+
+
+def pairs(runs: Sequence[Mapping[str, Any]]) -> list[dict[int, Mapping[str, Any]]]:
+    """The runs of each pair by their number of workers, in the order of measurement."""
+    couples = zip(runs[::2], runs[1::2], strict=True)
+    return [{run["workers"]: run for run in couple} for couple in couples]
+
+
+def ratios(runs: Sequence[Mapping[str, Any]]) -> list[float]:
+    """Wall time of one worker over that of two, for each pair."""
+    return [pair[1]["wall_s"] / pair[2]["wall_s"] for pair in pairs(runs)]
+
+
+def table(data: Mapping[str, Any]) -> str:
+    """The table of docs/data_sets.md."""
+    found = ratios(data["runs"])
+    lines = [
+        f"{data['frames']} frames in shards of {data['frames_per_shard']} on {data['cores']} cores "
+        f"of {data['processor']}: two workers are {median(found):.2f} times as fast as one (median "
+        f"of {len(found)} pairs, {min(found):.2f} to {max(found):.2f}).",
+        "",
+        "| pair | one worker: wall time, s | processor time, s | two workers: wall time, s | "
+        "processor time of both, s | ratio of wall times |",
+        "|---:|" + "---:|" * 5,
+    ]
+    for number, (pair, ratio) in enumerate(zip(pairs(data["runs"]), found, strict=True), 1):
+        cells = [f"{pair[n]['wall_s']:.1f} | {sum(pair[n]['worker_s']):.1f}" for n in (1, 2)]
+        lines.append(f"| {number} | {cells[0]} | {cells[1]} | {ratio:.2f} |")
+    return "\n".join(lines)
 
 
 def made(place: Path, workers: int, size: tuple[int, int]) -> dict[str, Any]:
     """Make a data set; returns its wall time and the processor time of command and workers."""
+    import psutil
+
     samples, frames_per_shard = size
     out = place / f"out_{time.monotonic_ns()}"
     with cluster(place, workers) as (address, processes):
@@ -88,6 +118,8 @@ def made(place: Path, workers: int, size: tuple[int, int]) -> dict[str, Any]:
 
 def spent_s(process: psutil.Process) -> float:
     """Processor time of a process and of its children that have not ended."""
+    import psutil
+
     try:
         every = [process, *process.children(recursive=True)]
         return sum(sum(one.cpu_times()[:2]) for one in every)
@@ -98,6 +130,8 @@ def spent_s(process: psutil.Process) -> float:
 @contextmanager
 def cluster(place: Path, workers: int) -> Iterator[tuple[str, list[psutil.Process]]]:
     """A scheduler with workers; their address and processes."""
+    import psutil
+
     log = place / "scheduler.log"
     with open(log, "w", encoding="utf-8") as stream:
         dask = [sys.executable, "-m", "dask"]
@@ -123,6 +157,8 @@ def cluster(place: Path, workers: int) -> Iterator[tuple[str, list[psutil.Proces
 
 def ended(process: psutil.Popen) -> None:
     """End a process, by force where it does not end by itself."""
+    import psutil
+
     process.terminate()
     try:
         process.wait(GRACE_S)

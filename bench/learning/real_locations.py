@@ -15,20 +15,18 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.bench_data import ROOT, write_data
+from bench.bench_data import see_tests, write_data
 from bench.rigs.machine import machine
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
-TESTS = ROOT / "tests"
 SEED = 11
 SAMPLES, HELD_OUT = (600, 150), 100
 GAINS = (0.6, 1.0, 1.5, 2.2, 3.2)
@@ -55,55 +53,64 @@ def main() -> None:
     argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     ).parse_args()
-    sys.path[:0] = [str(TESTS / "twin"), str(TESTS / "force"), str(TESTS / "force" / "real_frames")]
+    see_tests("twin", "force", "force/real_frames")
     from real_looks import picture, seen
 
     rest, grid = seen("gelslim3/reference.jpg")
     presses = {name: picture(f"gelslim3/{name}.jpg") for name in READINGS_PX}
     contacts = Contacts(rest, SAMPLES[0] + HELD_OUT)
-    real = np.array([changes(image, rest.picture) for image in presses.values()])
     readings = np.array(list(READINGS_PX.values()), dtype=float)
     truth = readings.mean(axis=1)
-    per_mm = contacts.per_mm
     apart = np.linalg.norm(readings[:, 0] - readings[:, 1], axis=1)
-    rows: dict[str, Any] = {
-        "the middle of the picture, always": errors(
-            np.broadcast_to(contacts.middle_px, truth.shape), truth, per_mm
-        ),
-        "centroid of the change, no training": errors(
-            np.array([centroid(image, rest.picture) for image in presses.values()]), truth, per_mm
-        ),
-        "imprint found by the force pipeline": errors(
-            np.array(list(patches(presses, rest.picture))), truth, per_mm
-        ),
-    }
-    learned: list[dict[str, Any]] = []
-    for look, renderers in looks(rest, grid).items():
-        drawn = contacts.drawn(renderers)
-        for scaled, count in itertools.product((False, True), SAMPLES):
-            seen_by = (drawn, real) if not scaled else (unit(drawn), unit(real))
-            model = network(seen_by[0][:count], contacts.places_px[:count])
-            learned.append(
-                {
-                    "look": look,
-                    "unit": scaled,
-                    "samples": count,
-                    "drawn": errors(
-                        model(seen_by[0][-HELD_OUT:]), contacts.places_px[-HELD_OUT:], per_mm
-                    ),
-                    "real": errors(model(seen_by[1]), truth, per_mm),
-                }
-            )
+    real = np.array([changes(image, rest.picture) for image in presses.values()])
+    learned = [
+        {"look": look, **row}
+        for look, renderers in looks(rest, grid).items()
+        for row in networks(contacts, contacts.drawn(renderers), real, truth)
+    ]
     data = {
         **machine(SEED),
         "presses": len(truth),
-        "px_per_mm": per_mm,
-        "readings_apart_mm": float(np.sqrt(np.mean((apart / per_mm) ** 2))),
-        "without": rows,
+        "px_per_mm": contacts.per_mm,
+        "readings_apart_mm": float(np.sqrt(np.mean((apart / contacts.per_mm) ** 2))),
+        "without": untrained(contacts, presses, rest.picture, truth),
         "learned": learned,
     }
     write_data("real_locations", data)
     print(table(data))
+
+
+def untrained(
+    contacts: Contacts, presses: Mapping[str, Picture], rest: Picture, truth: Array
+) -> dict[str, Any]:
+    """Errors of what learns nothing, on the real presses, by its name."""
+    found = {
+        "the middle of the picture, always": np.broadcast_to(contacts.middle_px, truth.shape),
+        "centroid of the change, no training": np.array(
+            [centroid(image, rest) for image in presses.values()]
+        ),
+        "imprint found by the force pipeline": np.array(list(patches(presses, rest))),
+    }
+    return {name: errors(places, truth, contacts.per_mm) for name, places in found.items()}
+
+
+def networks(
+    contacts: Contacts,
+    drawn: Array,
+    real: Array,
+    truth: Array,
+) -> Iterator[dict[str, Any]]:
+    """Errors of networks that learn from drawn changes, on those held out and on real ones."""
+    places = contacts.places_px
+    for scaled, count in itertools.product((False, True), SAMPLES):
+        taught, met = (unit(drawn), unit(real)) if scaled else (drawn, real)
+        model = network(taught[:count], places[:count])
+        yield {
+            "unit": scaled,
+            "samples": count,
+            "drawn": errors(model(taught[-HELD_OUT:]), places[-HELD_OUT:], contacts.per_mm),
+            "real": errors(model(met), truth, contacts.per_mm),
+        }
 
 
 class Contacts:

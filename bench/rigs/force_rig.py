@@ -97,12 +97,7 @@ class Rig:
             GEL,
             "bbar",
             marker_positions_mm=grid.positions_mm,
-            marker_arrays={
-                "row": grid.row,
-                "column": grid.column,
-                "diameter_mm": grid.diameter_mm,
-                "kind": grid.kind,
-            },
+            marker_arrays=grid.labels,
             camera=self.camera.to_record(),
             light=light_arrays(LIGHT),
             with_stiffness=False,

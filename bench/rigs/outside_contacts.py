@@ -8,24 +8,21 @@ the bundle states.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from bench.bench_data import see_tests
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.ladder import refined
 from ifem_export.operators.surface_operator import SurfaceOperator, surface_operator
 
-TESTS = str(Path(__file__).parents[2] / "tests" / "force")
-if TESTS not in sys.path:
-    sys.path.insert(0, TESTS)
+see_tests("force")
 
 from pressed_disc import PressedDisc, pressed_disc  # noqa: E402
 from pressed_samples import FRICTION, surface_splines, tractions  # noqa: E402

@@ -11,7 +11,6 @@ Their figures go into docs/data, and their pictures only where `--real` says.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.bench_data import DOCS, ROOT, write_data, write_whole
+from bench.bench_data import DOCS, see_tests, write_data, write_whole
 from bench.rigs.machine import machine
 
-TESTS = ROOT / "tests"
 SEED = 3
 ENLARGED = 2
 Picture = NDArray[np.uint8]
@@ -34,7 +32,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--real", type=Path, help="folder for the pictures of real sensors")
     asked = parser.parse_args()
-    sys.path[:0] = [str(TESTS), str(TESTS / "force"), str(TESTS / "twin")]
+    see_tests("force", "twin")
     from gelslim_force.outputs.canvas import encoded
 
     hidden, pairs = drawn_sensor()

@@ -24,14 +24,14 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from bench.bench_data import DOCS, ROOT, write_data, write_whole
+from bench.bench_data import DOCS, see_tests, write_data, write_whole
 from bench.rigs.machine import machine
 
-sys.path.insert(0, str(ROOT / "tests" / "twin"))
+see_tests("twin")
 
-from bench.rigs.planning_tasks import Task, perform, warm
-from bench.rigs.twin_rig import QUICK, SCENES, kept_sensor
-from gelslim_core.jobs import Engine
+from bench.rigs.planning_tasks import Task, perform, warm  # noqa: E402
+from bench.rigs.twin_rig import QUICK, SCENES, kept_sensor  # noqa: E402
+from gelslim_core.jobs import Engine  # noqa: E402
 
 NAME = "twin_planning"
 SEEDS = range(2000, 2100)

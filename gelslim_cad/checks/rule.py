@@ -135,7 +135,23 @@ def rule(
     unit: str | None = None,
     of_markers: bool = False,
 ) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
-    """Register a rule; `parameter` is the spec path to change when it does not hold."""
+    """Register a rule.
+
+    Args:
+        rule_id: Its name, such as `finger.thickness_mm`.
+        title: What it demands.
+        parameter: The spec path to change where it does not hold.
+        why: Why it exists.
+        advice: How to change the parameter.
+        unit: Unit of value and limit; by default the suffix of its name.
+        of_markers: Whether it is left out without markers.
+
+    Returns:
+        A decorator for the function that judges; its parameters name spec fields and dimensions.
+
+    Raises:
+        ValueError: The rule is defined twice, or names what does not exist.
+    """
 
     def register(judge: Callable[..., Finding]) -> Callable[..., Finding]:
         if rule_id in RULES:

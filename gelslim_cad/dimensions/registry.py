@@ -66,7 +66,18 @@ def dimension(
 ) -> Callable[[Compute], Compute]:
     """Register a function as the dimension `name`; its unit is the name's suffix.
 
-    A function of many inputs names them by `inputs` and takes one mapping from these names.
+    Args:
+        name: Its name, such as `finger.thickness_mm`.
+        formula: What it computes, for readers.
+        source: Where the formula comes from.
+        internal: Whether only other dimensions use it, so that no list shows it.
+        inputs: Names of the inputs of a function that has many and takes one mapping from them.
+
+    Returns:
+        A decorator for the function that computes it.
+
+    Raises:
+        ValueError: The dimension is defined twice, or its function has another name.
     """
 
     def register(function: Compute) -> Compute:

@@ -123,30 +123,23 @@ def lay_out(shape: BoardShape, found: Circuit, plan: StringPlan) -> Board:
         led_component(f"D{i + 1}", found.led, (x, 0.0), plan.led_nets(i), shape.cathode_to)
         for i, x in enumerate(shape.led_x_mm)
     )
-    resistors: list[Component] = []
+    resistors = _resistors(row, plan)
+    waiting = iter(resistors)
     ends = plan.last_leds()
     for i, led in enumerate(leds):
-        x = shape.led_x_mm[i]
         if any(p.role == "thermal" for p in led.pads):
             heat = led.pad("thermal")
             width = min(row.chain_mm, heat.size_mm[0])
             copper.track(heat.at_mm, led.pad("cathode").at_mm, width, led)
+        cathode_mm = led.pad("cathode").at_mm
         if i not in ends:
-            copper.track(
-                led.pad("cathode").at_mm, leds[i + 1].pad("anode").at_mm, row.chain_mm, led
-            )
+            copper.track(cathode_mm, leds[i + 1].pad("anode").at_mm, row.chain_mm, led)
             continue
-        end = row.end_mm(x)
-        if size is not None:
-            number = len(resistors) + 1
-            centre = (end + PART_MM + size.length_mm / 2, 0.0)
-            part = resistor_component(
-                f"R{number}", size, plan.resistors_ohm[number - 1], centre, plan.led_nets(i)[1]
-            )
-            resistors.append(part)
-            copper.resistor(led, part)
+        if resistors:
+            copper.resistor(led, next(waiting))
         else:
-            copper.ground(led.pad("cathode").at_mm, end + WEB_MM + shape.spacing.via_mm / 2)
+            end_mm = row.end_mm(shape.led_x_mm[i])
+            copper.ground(cathode_mm, end_mm + WEB_MM + shape.spacing.via_mm / 2)
         if i + 1 < len(leds):
             copper.supply(leds[i + 1], row.start_mm(shape.led_x_mm[i + 1]))
     head = _wire_pads(row)
@@ -167,6 +160,20 @@ def lay_out(shape: BoardShape, found: Circuit, plan: StringPlan) -> Board:
         marks=legend(shape.x_mm, shape.width_mm, components, shape.label),
         spacing=shape.spacing,
     )
+
+
+def _resistors(row: RowGeometry, plan: StringPlan) -> tuple[Component, ...]:
+    """The resistor behind the last LED of each string, in the order of the strings."""
+    size = row.size
+    if size is None:
+        return ()
+    made = []
+    for number, led in enumerate(sorted(plan.last_leds())):
+        end_mm = row.end_mm(row.shape.led_x_mm[led])
+        centre_mm = (end_mm + PART_MM + size.length_mm / 2, 0.0)
+        resistance_ohm, net = plan.resistors_ohm[number], plan.led_nets(led)[1]
+        made.append(resistor_component(f"R{number + 1}", size, resistance_ohm, centre_mm, net))
+    return tuple(made)
 
 
 def room_mm(shape: BoardShape, found: Circuit) -> float:

@@ -22,7 +22,7 @@ class StringPlan:
     resistors_ohm: tuple[float, ...]
 
     def place(self, led: int) -> tuple[int, int]:
-        """String of an LED and its place in it, both from 0."""
+        """String of an LED and its place in it, both from 0; IndexError beyond the last LED."""
         for number, length in enumerate(self.lengths):
             if led < length:
                 return number, led

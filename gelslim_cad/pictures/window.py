@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import io
 import os
 from collections.abc import Iterator, Sequence
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_cad.pictures.graphics_libraries import loads, package_named_in
 from gelslim_cad.pictures.mesh_scene import MeshScene
 from gelslim_core.errors import GelslimError
 from gelslim_core.optional_library import install_command
@@ -39,7 +39,7 @@ def offscreen_window() -> Iterator[Any]:
     vtkObject.GlobalWarningDisplayOff()
     window = vtkRenderWindow()
     kind = type(window).__name__
-    if "OSOpenGL" in kind and not any(map(_loads, ("libOSMesa.so.8", "libOSMesa.so.6"))):
+    if "OSOpenGL" in kind and not any(map(loads, ("libOSMesa.so.8", "libOSMesa.so.6"))):
         raise PictureError(
             "no off-screen OpenGL: neither EGL nor OSMesa works here; "
             "install the Debian packages libegl1 and libgl1-mesa-dri"
@@ -109,26 +109,7 @@ def png_bytes(image: np.ndarray) -> bytes:
 
 
 def _missing(reason: str) -> str:
-    packages = {
-        "libGL.so": "libgl1",
-        "libEGL": "libegl1",
-        "libOpenGL": "libopengl0",
-        "libXrender": "libxrender1",
-        "libXcursor": "libxcursor1",
-        "libXfixes": "libxfixes3",
-        "libX11": "libx11-6",
-        "libSM": "libsm6",
-        "libICE": "libice6",
-    }
-    for library, package in packages.items():
-        if library in reason:
-            return f"VTK cannot load {library}: install the Debian package {package} ({reason})"
+    library, package = package_named_in(reason)
+    if package:
+        return f"VTK cannot load {library}: install the Debian package {package} ({reason})"
     return f"VTK is not installed: {install_command('view')} ({reason})"
-
-
-def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True

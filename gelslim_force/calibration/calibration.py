@@ -86,22 +86,15 @@ def calibrate(
     checks.require_upright(design.project(flat), chosen.centres_px)
     checks.require_print(registration, dots, expected)
     checks.require_anchors(chosen, design, grid, found)
-    try:
-        fit, rest, residuals = _fitted(
-            expected_camera,
-            flat,
-            diameter,
-            fine_centres_px(image, chosen, settings),
-            chosen.trustworthy,
-            tolerance,
-            grid.pitch_mm,
-        )
-    except ValueError as error:
-        raise CalibrationError(
-            "fit",
-            f"no plausible camera puts the print where the dots are: {error}; use the bundle of "
-            "the sensor that took the picture",
-        ) from error
+    fit, rest, residuals = _fitted(
+        expected_camera,
+        flat,
+        diameter,
+        fine_centres_px(image, chosen, settings),
+        chosen.trustworthy,
+        tolerance,
+        grid.pitch_mm,
+    )
     checks.require_fit(fit, grid.pitch_mm, registration.pitch_px)
     if not allow_contact:
         checks.require_no_contact(residuals)
@@ -145,15 +138,22 @@ def _fitted(
 
     `points_mm` (n, 3) is the print on the gel at rest, `clean` (n,) are the dots to fit by. Where
     the first fit finds a contact, the second one leaves out the dots near it, so that the contact
-    does not distort the camera.
+    does not distort the camera. Raises CalibrationError where no camera explains the dots.
     """
     points, heights = points_mm[:, :2], points_mm[:, 2]
     used = clean
     for last in (False, True):
-        fit = fit_camera(design, points, diameter_mm, centres_px, tolerance, used, heights)
-        slopes = fit.camera.pixel_slopes(centres_px - fit.offset_px)
-        rest = fit.camera.points_along(slopes, heights)[:, :2]
-        residuals = split_residuals(points[clean], (rest - points)[clean], pitch_mm)
+        try:
+            fit = fit_camera(design, points, diameter_mm, centres_px, tolerance, used, heights)
+            slopes = fit.camera.pixel_slopes(centres_px - fit.offset_px)
+            rest = fit.camera.points_along(slopes, heights)[:, :2]
+            residuals = split_residuals(points[clean], (rest - points)[clean], pitch_mm)
+        except ValueError as error:
+            raise CalibrationError(
+                "fit",
+                f"no plausible camera puts the print where the dots are: {error}; use the bundle "
+                "of the sensor that took the picture",
+            ) from error
         bump = checks.contact_of(residuals)
         if last or bump is None:
             break

@@ -40,7 +40,7 @@ _ANCHOR_STEP = 0.5
 
 
 def require_size(image: NDArray[np.uint8], camera: VirtualCamera) -> None:
-    """Reject what is not a picture of the camera's size."""
+    """Reject what is not a picture of the camera's size. Raises CalibrationError."""
     try:
         height, width = as_planes(image).shape[:2]
     except ValueError as error:
@@ -70,7 +70,7 @@ def markers_in_view(camera: VirtualCamera, grid: MarkerGrid) -> NDArray[np.bool_
 
 
 def require_dots(dots: Detections, expected: NDArray[np.bool_]) -> None:
-    """Reject a picture with too few dots to be the print."""
+    """Reject a picture with too few dots to be the print. Raises CalibrationError."""
     least = max(LEAST_MARKERS, int(np.ceil(LEAST_SEEN * expected.sum())))
     if len(dots) < least:
         raise CalibrationError(
@@ -82,7 +82,7 @@ def require_dots(dots: Detections, expected: NDArray[np.bool_]) -> None:
 
 
 def require_upright(expected_px: ArrayLike, seen_px: ArrayLike) -> None:
-    """Reject a turned or mirrored picture."""
+    """Reject a turned or mirrored picture. Raises CalibrationError."""
     turn = picture_turn(expected_px, seen_px)
     if turn:
         raise CalibrationError(
@@ -95,7 +95,11 @@ def require_upright(expected_px: ArrayLike, seen_px: ArrayLike) -> None:
 def require_print(
     registration: Registration, dots: Detections, expected: NDArray[np.bool_]
 ) -> None:
-    """Reject the lattice of another print: too few of this print's dots, or too many others."""
+    """Reject the lattice of another print: too few of this print's dots, or too many others.
+
+    Raises:
+        CalibrationError: The picture shows another print, or too little of this one.
+    """
     found = int(registration.found.sum())
     least = max(LEAST_MARKERS, int(np.ceil(LEAST_SEEN * expected.sum())))
     if found < least:
@@ -118,7 +122,7 @@ def require_print(
 def require_anchors(
     dots: Detections, camera: VirtualCamera, grid: MarkerGrid, found: NDArray[np.int64]
 ) -> None:
-    """Reject a print whose large dots are elsewhere."""
+    """Reject a print whose large dots are elsewhere. Raises CalibrationError."""
     flat = np.column_stack([grid.positions_mm[found], np.zeros(len(found))])
     area_px_per_mm2 = np.abs(np.linalg.det(camera.jacobian(flat)))
     large = grid.kind[found] == ANCHOR_LARGE
@@ -147,7 +151,7 @@ def contact_of(residuals: ResidualField) -> ResidualBump | None:
 
 
 def require_no_contact(residuals: ResidualField) -> None:
-    """Reject a picture in which neighbouring dots are displaced together."""
+    """Reject a picture in which neighbouring dots move together. Raises CalibrationError."""
     bump = contact_of(residuals)
     if bump is not None:
         raise CalibrationError(
@@ -161,7 +165,11 @@ def require_no_contact(residuals: ResidualField) -> None:
 
 
 def require_fit(fit: CameraFit, pitch_mm: float, pitch_px: float) -> None:
-    """Reject a camera that does not explain the dots, or is far out of its tolerances."""
+    """Reject a camera that does not explain the dots, or is far out of its tolerances.
+
+    Raises:
+        CalibrationError: It is such a camera.
+    """
     off = float(np.sqrt(np.median((fit.residual_px**2).sum(axis=1))))
     share = float(fit.used.mean())
     if off > MOST_RESIDUAL_PITCH * pitch_px or share < LEAST_USED:

@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from ifem_export.errors import IfemError
-from ifem_export.markers.grid import MarkerGrid
+from ifem_export.markers.grid import LABELS, MarkerGrid
 from ifem_export.markers.interpolation import marker_to_node
 
 if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
-
-_ARRAYS = ("row", "column", "diameter_mm", "kind")
 
 
 def bundle_camera(bundle: Bundle) -> VirtualCamera:
@@ -54,7 +52,7 @@ def bundle_grid(bundle: Bundle) -> MarkerGrid:
     field = bundle.markers
     if field is None:
         raise IfemError("the bundle has no markers: rebuild it from a spec with a marker print")
-    absent = [name for name in _ARRAYS if name not in field.arrays]
+    absent = [name for name in LABELS if name not in field.arrays]
     if absent:
         raise IfemError(
             f"the bundle's markers have no {', '.join(absent)}: rebuild it with "

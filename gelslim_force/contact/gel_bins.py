@@ -108,6 +108,9 @@ def bin_positions(
 
     Returns x and y (rows, columns) on the rest surface, the parallax (rows, columns, 2) of the line
     of sight per mm of height, and the relative change of lengths per mm of height.
+
+    Raises:
+        ValueError: The reference has another size than the camera's pictures.
     """
     pixels = light.centres_px()
     expected = (camera.image_height_px, camera.image_width_px)

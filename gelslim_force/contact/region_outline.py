@@ -160,6 +160,9 @@ def fit_strip(points_mm: Array) -> tuple[Array, Array]:
     """Offset, half-width and angle (rad) (3,) of two parallel lines, with covariance (3, 3).
 
     The lines are {p : n·p = offset ± half-width}, with n perpendicular to the strip's direction.
+
+    Raises:
+        ValueError: There are fewer than four points.
     """
     if len(points_mm) < 4:
         raise ValueError("a strip needs four points")

@@ -115,12 +115,7 @@ def sensor_bundle(
         material,
         "bbar",
         marker_positions_mm=grid.positions_mm,
-        marker_arrays={
-            "row": grid.row,
-            "column": grid.column,
-            "diameter_mm": grid.diameter_mm,
-            "kind": grid.kind,
-        },
+        marker_arrays=grid.labels,
         camera=camera.to_record(),
         spec_hash=description_hash(asked),
         with_stiffness=False,

@@ -78,7 +78,11 @@ class ReferenceLattice:
 
     @cached_property
     def pitch_px(self) -> NDArray[np.float64]:
-        """(n,) smallest distance to the neighbours one site away; the median without such a one."""
+        """(n,) smallest distance to the neighbours one site away; the median without such a one.
+
+        Raises:
+            ValueError: No two markers are neighbours.
+        """
         pitch = np.full(len(self), np.inf)
         for k in range(4):
             j = self.neighbours[:, k]

@@ -87,7 +87,11 @@ def read_run(folder: str | os.PathLike[str]) -> RecordedRun:
 
 
 def field_files(folder: Path) -> list[Path]:
-    """Return the files of fields in order: each chunk, or its journal if it has no chunk yet."""
+    """Return the files of fields in order: each chunk, or its journal if it has no chunk yet.
+
+    Raises:
+        OutputError: The folder cannot be listed.
+    """
     best: dict[int, Path] = {}
     try:
         names = sorted(folder.iterdir())

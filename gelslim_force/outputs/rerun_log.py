@@ -106,7 +106,11 @@ class RerunLog(AbstractContextManager["RerunLog"]):
             stream.log("problems", rr.TextLog(problem, level="WARN"))
 
     def finish(self) -> None:
-        """Write the rest and give the file its name; a second call does nothing."""
+        """Write the rest and give the file its name; a second call does nothing.
+
+        Raises:
+            OutputError: The disk refuses it.
+        """
         if self._stream is None:
             return
         self._stream.flush()

@@ -95,6 +95,10 @@ def surface_points(
     """Points (n, 3) where the rays with `slopes` (n, 2) in air meet `surface` first.
 
     See `VirtualCamera.backproject`; a function needs `z_range_mm`.
+
+    Raises:
+        ValueError: A choice or a range cannot be used, or a ray misses the surface and `outside`
+            is "raise".
     """
     if outside not in ("raise", "nan"):
         raise ValueError(f'outside = {outside!r} must be "raise" or "nan"')

@@ -57,7 +57,16 @@ class FrictionalContact:
         self.touch = np.zeros(len(height), dtype=np.int8)
 
     def balance(self, start: Array, start_mm: Array | None, tolerance: float) -> ContactForces:
-        """Sweep until no node changes its force."""
+        """Sweep until no node changes its force.
+
+        Args:
+            start: Forces (c, 3) in N to begin with.
+            start_mm: Motion (c, 3) in mm under these forces, where it is known.
+            tolerance: Largest residual, relative to the forces.
+
+        Raises:
+            ContactError: The sweeps do not converge.
+        """
         f = np.ascontiguousarray(start).reshape(-1).copy()
         beside = np.isinf(self.height)
         if f.reshape(-1, 3)[beside].any():

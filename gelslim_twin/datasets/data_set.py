@@ -276,7 +276,11 @@ def description(job: DataSetJob, count: int) -> dict[str, Any]:
 
 
 def counted(folder: Path, wanted: Sequence[Shard]) -> dict[str, Any]:
-    """Counts over all shards, reasons of failures, and the size of the files."""
+    """Counts over all shards, reasons of failures, and the size of the files in bytes.
+
+    Raises:
+        DataSetError: A shard has no record.
+    """
     splits: dict[str, Counter[str]] = {split: Counter() for split in SPLITS}
     reasons: Counter[str] = Counter()
     arrays: dict[str, Any] = {}

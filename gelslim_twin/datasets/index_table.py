@@ -182,7 +182,17 @@ class NothingMadeError(DataSetError):
 
 
 def write_index(dataset: Path, names: Sequence[str]) -> None:
-    """Join the rows of all shards; the memory that it takes does not depend on their number."""
+    """Join the rows of all shards; the memory that it takes does not depend on their number.
+
+    Args:
+        dataset: Folder of the data set, in which the index is written.
+        names: Names of the shards in their order.
+
+    Raises:
+        DataSetError: No shard has a row.
+        MissingLibraryError: pyarrow is not installed.
+        OSError: A record cannot be read, or the index not written.
+    """
     parquet = load("pyarrow.parquet", PURPOSE)
     writer = None
     with replacement(dataset / INDEX) as stream:

@@ -66,7 +66,11 @@ class Placement:
 def require_no_undercut(
     name: str, side: Side, pose: Pose, pad_mm: tuple[float, float], top_mm: float
 ) -> None:
-    """The same for one body, by its name, its side and the pose of that side."""
+    """The same for one body, by its name, its side and the pose of that side.
+
+    Raises:
+        StepError: The gel meets an undercut.
+    """
     met = None if side.undercut is None else side.undercut.below(pose, pad_mm, top_mm)
     if met is not None:
         raise StepError(

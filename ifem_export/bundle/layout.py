@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -71,36 +73,13 @@ def bundle_from(
     Raises:
         BundleError: A section or array is missing or does not fit the others.
     """
-    try:
+    take = _Arrays(arrays)
+    with _told_as_malformed():
         material = Material(**manifest["material"])
-        mesh_section = manifest["mesh"]
-        size = tuple(float(v) for v in mesh_section["cell_size_mm"])
-        origin = tuple(float(v) for v in mesh_section["origin_mm"])
-        n, m = int(mesh_section["nodes"]), int(mesh_section["elements"])
-        cells = tuple(int(c) for c in mesh_section["cells"])
-        weighted = bool(mesh_section.get("weighted", False))
-        crowned = bool(mesh_section.get("crowned", False))
         formulation = manifest["element"]["formulation"]
         has_stiffness = bool(manifest["stiffness"]["stored"])
-    except (KeyError, TypeError, ValueError) as error:
-        reason = str(error) if isinstance(error, IfemError) else f"is malformed ({error!r})"
-        raise BundleError(MANIFEST, reason, REBUILD) from error
-    if len(size) != 3 or len(origin) != 3:
-        raise BundleError(MANIFEST, "cell_size_mm and origin_mm must have 3 values", REBUILD)
-    take = _Arrays(arrays)
-    mesh = PadMesh(
-        nodes_mm=take("nodes_mm", "<f8", (n, 3)),
-        hexes=take("hexes", "<i4", (m, 8)),
-        bonded=take("bonded_nodes", "<i4", (None,)),
-        surface=take("surface_nodes", "<i4", (None,)),
-        sides=take("side_nodes", "<i4", (None,)),
-        cell_size_mm=(size[0], size[1], size[2]),
-        origin_mm=(origin[0], origin[1], origin[2]),
-        occupancy=take("occupancy", "|b1", cells),
-        fill=take("cell_fill", "<f8", cells) if weighted else None,
-        surface_shift=take("surface_shift", "<f8", (None,)) if crowned else None,
-    )
-    take("free_nodes", "<i4", (n - len(mesh.bonded),))
+    mesh = _mesh_from(manifest, take)
+    n = mesh.n_nodes
     return Bundle(
         mesh=mesh,
         material=material,
@@ -125,6 +104,44 @@ def bundle_from(
         skin=_skin_from(manifest),
         imported=_imported_from(manifest),
     )
+
+
+@contextmanager
+def _told_as_malformed() -> Iterator[None]:
+    """Raise BundleError where a section of the manifest lacks a value or has a wrong one."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError) as error:
+        reason = str(error) if isinstance(error, IfemError) else f"is malformed ({error!r})"
+        raise BundleError(MANIFEST, reason, REBUILD) from error
+
+
+def _mesh_from(manifest: dict[str, Any], take: _Arrays) -> PadMesh:
+    """The mesh, whose arrays must fit the sizes that the manifest states."""
+    with _told_as_malformed():
+        section = manifest["mesh"]
+        size = tuple(float(v) for v in section["cell_size_mm"])
+        origin = tuple(float(v) for v in section["origin_mm"])
+        n, m = int(section["nodes"]), int(section["elements"])
+        cells = tuple(int(c) for c in section["cells"])
+        weighted = bool(section.get("weighted", False))
+        crowned = bool(section.get("crowned", False))
+    if len(size) != 3 or len(origin) != 3:
+        raise BundleError(MANIFEST, "cell_size_mm and origin_mm must have 3 values", REBUILD)
+    mesh = PadMesh(
+        nodes_mm=take("nodes_mm", "<f8", (n, 3)),
+        hexes=take("hexes", "<i4", (m, 8)),
+        bonded=take("bonded_nodes", "<i4", (None,)),
+        surface=take("surface_nodes", "<i4", (None,)),
+        sides=take("side_nodes", "<i4", (None,)),
+        cell_size_mm=(size[0], size[1], size[2]),
+        origin_mm=(origin[0], origin[1], origin[2]),
+        occupancy=take("occupancy", "|b1", cells),
+        fill=take("cell_fill", "<f8", cells) if weighted else None,
+        surface_shift=take("surface_shift", "<f8", (None,)) if crowned else None,
+    )
+    take("free_nodes", "<i4", (n - len(mesh.bonded),))
+    return mesh
 
 
 def _skin_from(manifest: dict[str, Any]) -> Skin | None:

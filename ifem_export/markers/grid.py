@@ -17,6 +17,8 @@ Anchors = Literal["odd_sized", "omitted", "none"]
 """How anchors are marked: by a larger dot, by a site without a dot, or no anchors."""
 REGULAR, ANCHOR_LARGE = 0, 1
 """Values of `MarkerGrid.kind`."""
+LABELS = ("row", "column", "diameter_mm", "kind")
+"""Arrays of `MarkerGrid` that a bundle keeps beside the places of the dots."""
 _RIM_POINTS = 32
 _LATTICE_TOLERANCE = 1e-4
 
@@ -81,6 +83,11 @@ class MarkerGrid:
     def __len__(self) -> int:
         """Number of dots."""
         return len(self.row)
+
+    @property
+    def labels(self) -> dict[str, NDArray[Any]]:
+        """What a bundle keeps of each dot beside its place: the arrays (m,) named in `LABELS`."""
+        return {name: getattr(self, name) for name in LABELS}
 
     @property
     def anchor_sites(self) -> NDArray[np.int64]:

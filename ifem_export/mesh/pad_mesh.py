@@ -246,24 +246,18 @@ def build_pad_mesh(
     z = np.asarray(np.arange(-n_layers, 1) * hz, dtype=np.float64)
     occupancy, fill = filled_cells(outline, crown, (x, y, z), weighting, floor)
     if not occupancy.any():
-        by_centre = weighting == "cell_centre"
-        lacking = "has its centre" if by_centre else f"is filled by {floor:g} or more"
-        raise MeshError(
-            f"no cell of the {pitch[0]:g} x {pitch[1]:g} mm lattice {lacking} inside the outline: "
-            "use a finer pitch",
-            field="pitch_mm",
-            value=(float(pitch[0]), float(pitch[1])),
-        )
+        raise _no_cell(pitch, weighting, floor)
     kept = keep_bonded_part(occupancy)
+    share = None if fill is None else np.where(kept, fill, 0.0)
     window, first = _trim(kept)
     corner = start + (low + first) * pitch
     mesh = PadMesh.from_occupancy(
         np.ascontiguousarray(kept[window]),
         (pitch[0], pitch[1], hz),
         (corner[0], corner[1], -thickness_mm),
-        None if fill is None else np.where(kept, fill, 0.0)[window],
+        None if share is None else share[window],
     )
-    plan = kept.any(axis=2) if fill is None else np.where(kept, fill, 0.0).max(axis=2)
+    plan = kept.any(axis=2) if share is None else share.max(axis=2)
     report = CropReport(
         n_cells_inside=int(occupancy.sum()),
         n_cells_kept=int(kept.sum()),
@@ -280,6 +274,18 @@ def build_pad_mesh(
         return mesh.crowned(None), report
     levels = crown_levels(crown, mesh.occupancy.shape, mesh.origin_mm, mesh.cell_size_mm)
     return mesh.crowned(levels), report
+
+
+def _no_cell(pitch_mm: NDArray[np.float64], weighting: Weighting, floor: float) -> MeshError:
+    """The error of a lattice without a cell in the outline."""
+    by_centre = weighting == "cell_centre"
+    lacking = "has its centre" if by_centre else f"is filled by {floor:g} or more"
+    return MeshError(
+        f"no cell of the {pitch_mm[0]:g} x {pitch_mm[1]:g} mm lattice {lacking} inside the "
+        "outline: use a finer pitch",
+        field="pitch_mm",
+        value=(float(pitch_mm[0]), float(pitch_mm[1])),
+    )
 
 
 def _lattice_pitch(

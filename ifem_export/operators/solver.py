@@ -134,7 +134,10 @@ class ConjugateGradients:
         return int(matrix_bytes(self.matrix) + self.preconditioner.blocks.nbytes)
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
-        """Solve to a relative residual, starting from the preconditioner's result."""
+        """Solve to a relative residual, starting from the preconditioner's result.
+
+        Raises ConvergenceError where the residual stays above `rtol`.
+        """
         right = _checked(b, self.matrix.shape[0])
         size = float(np.linalg.norm(right))
         if size == 0.0:
@@ -191,6 +194,7 @@ class SparseFactor:
 
         A residual above the tolerance is accepted if it is that of rounding the matrix: the
         solution is then exact for a matrix with the same digits (Rigal and Gaches 1967).
+        Raises ConvergenceError for a larger one.
         """
         right = _checked(b, self.matrix.shape[0])
         size = float(np.linalg.norm(right))

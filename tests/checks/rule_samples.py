@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from shipped_fingers import varied
+
 from gelslim_cad.checks import Check, check
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.spec import Spec
@@ -18,19 +20,6 @@ DESIGNS = Path(__file__).parents[2] / "designs"
 @cache
 def shipped(name: str) -> Spec:
     return read_spec(DESIGNS / f"{name}.yaml").spec
-
-
-def varied(spec: Spec, changes: dict[str, Any]) -> Spec:
-    """`spec` with fields replaced by dotted path, validated anew."""
-    data = spec.model_dump()
-    for path, value in changes.items():
-        *blocks, name = path.split(".")
-        block = data
-        for key in blocks:
-            block = block[key]
-        assert name in block, path
-        block[name] = value
-    return Spec(**data)
 
 
 def overruled(d: Dimensions, values: dict[str, Any]) -> Dimensions:

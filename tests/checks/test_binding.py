@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import pytest
-from rule_samples import shipped, varied
+from rule_samples import shipped
+from shipped_fingers import varied
 
 from gelslim_cad.checks.binding import _fitting, _fitting_pair, binding_sentences
 from gelslim_cad.checks.relaxation import derive_each, growing_changes, relaxations

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rule_samples import judged, overruled, shipped, smallest, varied
+from rule_samples import judged, overruled, shipped, smallest
+from shipped_fingers import varied
 
 from gelslim_cad.checks import check, margins_batch
 from gelslim_cad.dimensions import derive, derive_batch

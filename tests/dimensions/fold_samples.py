@@ -6,6 +6,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from shipped_fingers import varied
+
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import read_spec
@@ -19,21 +21,8 @@ USUAL = {"design.optics.image_margin": 0.015, "design.mirror.thickness_mm": 1.0}
 
 @cache
 def shipped(name: str) -> Spec:
-    return changed(read_spec(DESIGNS / f"{name}.yaml").spec, USUAL)
-
-
-def changed(spec: Spec, changes: dict[str, Any]) -> Spec:
-    """`spec` with leaf fields replaced by dotted path, checked anew."""
-    data = spec.model_dump()
-    for path, value in changes.items():
-        *blocks, name = path.split(".")
-        block = data
-        for key in blocks:
-            block = block[key]
-        assert name in block, path
-        block[name] = value
-    return Spec(**data)
+    return varied(read_spec(DESIGNS / f"{name}.yaml").spec, USUAL)
 
 
 def mini20(changes: dict[str, Any] | None = None) -> Dimensions:
-    return derive(changed(shipped("mini20"), changes or {}))
+    return derive(varied(shipped("mini20"), changes or {}))

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fold_samples import changed, shipped
+from fold_samples import shipped
 from pydantic import ValidationError
+from shipped_fingers import varied
 
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.geometry.optics import lens_distortion, virtual_camera
@@ -27,12 +28,12 @@ WIDTH, HEIGHT, FOCAL = (shipped("mini20").model_dump()["camera"][n] for n in (
 
 
 def mini20(**distortion: Any) -> Spec:
-    return changed(shipped("mini20"), {f"camera.distortion.{k}": v for k, v in distortion.items()})
+    return varied(shipped("mini20"), {f"camera.distortion.{k}": v for k, v in distortion.items()})
 
 
 def with_camera(distortion: dict[str, Any], **camera: Any) -> Spec:
     changes = {f"camera.{name}": value for name, value in camera.items()}
-    return changed(mini20(**distortion), changes)
+    return varied(mini20(**distortion), changes)
 
 
 def border(d: Dimensions, count: int = 2001) -> np.ndarray:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fold_samples import changed, mini20, shipped
+from fold_samples import mini20, shipped
+from shipped_fingers import varied
 
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive, derive_batch
@@ -33,7 +34,7 @@ BOARD = {
 
 
 def finger(name: str, changes: dict[str, Any]) -> Dimensions:
-    return derive(changed(shipped(name), changes))
+    return derive(varied(shipped(name), changes))
 
 
 def wide(changes: dict[str, Any]) -> Dimensions:
@@ -98,7 +99,7 @@ def test_a_weighted_finger_is_the_best_of_those_with_a_length_limit(worth: float
     """Thickness and weighted length: the least over all lengths, each with its thinnest finger."""
     d = wide({ENVELOPE + "length_worth": worth})
     ours = d["finger.thickness_mm"] + worth * d["finger.length_mm"]
-    spec = changed(shipped("mini20"), BOARD)
+    spec = varied(shipped("mini20"), BOARD)
     shortest = wide({ENVELOPE + "goal": "shortest"})["finger.length_mm"]
     limits = np.linspace(shortest + 0.01, shortest + 40, 60)
     batch = derive_batch(spec, {ENVELOPE + "max_length_mm": limits})
@@ -129,7 +130,7 @@ def test_a_large_board_is_told_which_module_would_fit() -> None:
     from gelslim_cad.checks.binding import binding_sentences
 
     changes = {**BOARD, "design.envelope.max_thickness_mm": 20.0}
-    spec = changed(shipped("mini20"), changes)
+    spec = varied(shipped("mini20"), changes)
     advice = " ".join(binding_sentences(spec, derive(spec)))
     size = float(advice.split(" mm would fit")[0].rsplit(" ", 1)[-1])
     fits = wide({**changes, "camera.module_height_mm": size, "camera.module_width_mm": size})

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fold_samples import changed, shipped
+from fold_samples import shipped
+from shipped_fingers import varied
 
 from gelslim_cad.dimensions import Dimensions, derive_batch
 from gelslim_cad.dimensions import view as view_module
@@ -58,7 +59,7 @@ def problem() -> FoldProblem:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(view_module, "solve_fold", spy)
         with pytest.raises(NotSolvedError):
-            derive_batch(changed(shipped("mini20"), FREE), overrides)
+            derive_batch(varied(shipped("mini20"), FREE), overrides)
     order = np.arange(COUNT)[:, None, None]
     bent = np.where(order < IDEAL, 0.0, rng.normal(0, 1, (COUNT, 1, 1)))
     wide = (order >= IDEAL) & (order % 2 == 0)
@@ -192,7 +193,8 @@ def test_an_interrupted_batch_leaves_the_next_one_its_threads() -> None:
 
 def test_single_designs_do_not_load_the_compiler() -> None:
     code = (
-        "import sys; from fold_samples import mini20; from gelslim_cad.checks import check;"
+        "import sys; sys.path.append('..'); from fold_samples import mini20;"
+        "from gelslim_cad.checks import check;"
         "check(mini20());"
         "assert 'numba' not in sys.modules and 'cadquery' not in sys.modules"
     )

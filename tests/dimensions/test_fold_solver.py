@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fold_samples import changed, mini20, shipped
+from fold_samples import mini20, shipped
 from scipy.optimize import differential_evolution
+from shipped_fingers import varied
 
 from gelslim_cad.dimensions import Dimensions, derive, derive_batch
 from gelslim_cad.dimensions import view as view_module
@@ -100,7 +101,7 @@ def test_batch_equals_single_designs() -> None:
     batch = derive_batch(shipped("mini20"), overrides)
     for k in range(7):
         row = {path: float(v[k]) for path, v in overrides.items()}
-        single = derive(changed(shipped("mini20"), row))
+        single = derive(varied(shipped("mini20"), row))
         assert set(single.values) == set(batch.values)
         for name, value in single.values.items():
             assert batch[name][k] == pytest.approx(value, rel=1e-9, abs=1e-9), name
@@ -114,6 +115,7 @@ def test_unknown_override_is_refused() -> None:
 @pytest.mark.slow
 def test_two_fresh_processes_agree_to_the_bit() -> None:
     code = (
+        "import sys; sys.path.append('..')\n"
         "from fold_samples import mini20\n"
         "d = mini20()\n"
         "print(sorted((k, float(v).hex()) for k, v in d.values.items()))"
@@ -161,8 +163,8 @@ def test_a_fold_that_was_solved_before_is_taken_again_but_no_other() -> None:
     first = derive(spec)
     before = _solved_alone.cache_info()
     # What the fold does not read leaves it as it is; what it reads gives another.
-    again = derive(changed(spec, {"design.leds.radiant_flux_mw": 3.0}))
-    other = derive(changed(spec, {"design.optics.image_margin": 0.05}))
+    again = derive(varied(spec, {"design.leds.radiant_flux_mw": 3.0}))
+    other = derive(varied(spec, {"design.optics.image_margin": 0.05}))
     after = _solved_alone.cache_info()
     assert (after.hits - before.hits, after.misses - before.misses) == (1, 1)
     assert again["mirror.angle_deg"] == first["mirror.angle_deg"]

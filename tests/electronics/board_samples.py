@@ -6,6 +6,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import shipped_fingers
+
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.electronics.finger import FingerBoard, FingerBoards, finger_boards
 from gelslim_cad.spec import Spec
@@ -81,16 +83,8 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def varied(design: str, changes: dict[str, Any]) -> Spec:
-    """A shipped spec with fields replaced by dotted path, validated anew."""
-    data = read_spec(DESIGNS / f"{design}.yaml").spec.model_dump()
-    for path, value in changes.items():
-        *blocks, name = path.split(".")
-        block = data
-        for key in blocks:
-            block = block[key]
-        assert name in block, path
-        block[name] = value
-    return Spec(**data)
+    """A shipped spec with fields replaced by their dotted paths."""
+    return shipped_fingers.varied(read_spec(DESIGNS / f"{design}.yaml").spec, changes)
 
 
 @cache

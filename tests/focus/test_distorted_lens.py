@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from dimensions.fold_samples import USUAL, changed, shipped
+from dimensions.fold_samples import USUAL, shipped
 from sampled import quick
+from shipped_fingers import varied
 from test_lens_as_built import DESIGNS, calibrated, seen_at, seen_by_calibration
 
 import gelslim
@@ -33,7 +34,7 @@ PER_SIDE = 33
 
 def distorted(name: str, lens: str) -> Dimensions:
     changes = {f"camera.distortion.{k}": v for k, v in LENSES[lens].items()}
-    return derive(changed(shipped(name), changes))
+    return derive(varied(shipped(name), changes))
 
 
 def border_px(d: Dimensions, per_side: int = PER_SIDE) -> np.ndarray:
@@ -83,15 +84,15 @@ def test_a_lens_that_distorts_too_much_by_a_percent_is_refused() -> None:
 
     The best picture is known to `EQUAL_PX`, half of a percent.
     """
-    best = changed(shipped("mini20"), {"design.envelope.goal": "best_picture"})
+    best = varied(shipped("mini20"), {"design.envelope.goal": "best_picture"})
     ideal = least_px(derive(best))
-    bent = changed(best, {"camera.distortion.k1": -0.041})
+    bent = varied(best, {"camera.distortion.k1": -0.041})
     most = least_px(derive(bent))
     assert most == pytest.approx(0.99 * ideal, rel=2e-3)
     for more, holds in ((-0.001, True), (1.1 * EQUAL_PX, False)):
-        d = derive(changed(bent, {"design.optics.min_px_per_marker": most + more}))
+        d = derive(varied(bent, {"design.optics.min_px_per_marker": most + more}))
         assert keeps_all_rules(d) is holds
-    assert keeps_all_rules(derive(changed(best, {"design.optics.min_px_per_marker": 1.009 * most})))
+    assert keeps_all_rules(derive(varied(best, {"design.optics.min_px_per_marker": 1.009 * most})))
 
 
 def least_px(d: Dimensions) -> float:

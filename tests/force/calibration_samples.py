@@ -32,12 +32,7 @@ def small_bundle(grid: MarkerGrid, camera: VirtualCamera | None = None) -> Bundl
         Material(0.147, 0.3223, 1000.0),
         "full",
         marker_positions_mm=grid.positions_mm,
-        marker_arrays={
-            "row": grid.row,
-            "column": grid.column,
-            "diameter_mm": grid.diameter_mm,
-            "kind": grid.kind,
-        },
+        marker_arrays=grid.labels,
         camera=(camera or finger_view()).to_record(),
         with_stiffness=False,
     )

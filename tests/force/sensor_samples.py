@@ -50,12 +50,7 @@ def sensor_bundle() -> Bundle:
         Material(0.147, 0.3223, 1000.0),
         "bbar",
         marker_positions_mm=grid.positions_mm,
-        marker_arrays={
-            "row": grid.row,
-            "column": grid.column,
-            "diameter_mm": grid.diameter_mm,
-            "kind": grid.kind,
-        },
+        marker_arrays=grid.labels,
         camera=off_centre_view().to_record(),
         with_stiffness=False,
     )

@@ -125,7 +125,7 @@ def test_without_any_opengl_the_reason_is_given_instead_of_a_crash():
         "import sys; sys.path.insert(0, sys.argv[1])\n"
         "import report_sample\n"
         "from gelslim_cad.pictures import finger_pictures as pictures, window\n"
-        "window._loads = lambda name: False\n"
+        "window.loads = lambda name: False\n"
         "try: pictures.picture_whole(report_sample.meshes())\n"
         "except window.PictureError as error: print(error)"
     )

@@ -9,24 +9,18 @@ from shipped_fingers import parts as shipped_parts
 
 pytest.importorskip("cadquery", reason="solids need the [cad] extra")
 
+from shipped_fingers import varied
+
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.solids.finger import MAKERS
 from gelslim_cad.solids.reuse import PartStore
-from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import read_spec
 
 MINI20 = Path(__file__).parents[2] / "designs" / "mini20.yaml"
 
 
 def changed(path: str, value: float) -> Dimensions:
-    data = read_spec(MINI20).spec.model_dump()
-    *blocks, name = path.split(".")
-    block = data
-    for key in blocks:
-        block = block[key]
-    assert name in block
-    block[name] = value
-    return derive(Spec(**data))
+    return derive(varied(read_spec(MINI20).spec, {path: value}))
 
 
 def shape_of(d: Dimensions, store: PartStore) -> dict[str, tuple[float, ...]]:

@@ -10,8 +10,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.optics import camera_record
 from gelslim_cad.sensor import marker_grid
@@ -68,14 +66,13 @@ def finger_bundle(finger: Finger) -> Bundle:
         pitch_mm=finger.pitch_mm,
         layers=finger.layers,
     )
-    names = ("row", "column", "diameter_mm", "kind")
     camera = dict(camera_record(d)) | ({"lens_distortion": LENS} if finger.lens else {})
     return build_bundle(
         mesh,
         Material(spec.material.gel.youngs_modulus_mpa, finger.poissons_ratio, 1000.0),
         "bbar",
         marker_positions_mm=grid.positions_mm,
-        marker_arrays={name: np.asarray(getattr(grid, name)) for name in names},
+        marker_arrays=grid.labels,
         camera=camera,
         with_stiffness=False,
     )

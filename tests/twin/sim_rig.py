@@ -51,13 +51,12 @@ def small_sensor(folder: Path) -> Path:
 
 def write_sensor(place: Path, mesh: PadMesh, grid: MarkerGrid) -> None:
     """Write the bundle of a pad with a finger's camera."""
-    names = ("row", "column", "diameter_mm", "kind")
     bundle = build_bundle(
         mesh,
         Material(0.147, 0.3223, 1000.0),
         "bbar",
         marker_positions_mm=grid.positions_mm,
-        marker_arrays={name: getattr(grid, name) for name in names},
+        marker_arrays=grid.labels,
         camera={**finger_camera().to_record(), "aperture_mm": 1.0, "focus_mm": 36.0},
         with_stiffness=False,
     )

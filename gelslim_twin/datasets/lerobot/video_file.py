@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -107,6 +108,8 @@ class VideoFile:
 def library() -> Any:
     """The module `av`, quiet but for errors. Raises MissingLibraryError."""
     av = optional_library.load("av", "a data set of LeRobot with videos")
+    # The encoder of AV1 writes its settings to the terminal itself; 1 is errors alone.
+    os.environ.setdefault("SVT_LOG", "1")
     av.logging.set_level(av.logging.ERROR)
     return av
 

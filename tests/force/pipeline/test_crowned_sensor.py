@@ -34,13 +34,12 @@ def bundle() -> Bundle:
         crown=Paraboloid(CROWN_MM, RIM_MM),
         weighting="volume_fraction",
     )
-    names = ("row", "column", "diameter_mm", "kind")
     return build_bundle(
         mesh,
         Material(0.147, 0.3223, 1000.0),
         "bbar",
         marker_positions_mm=grid.positions_mm,
-        marker_arrays={name: getattr(grid, name) for name in names},
+        marker_arrays=grid.labels,
         camera=off_centre_view().to_record(),
         with_stiffness=False,
     )

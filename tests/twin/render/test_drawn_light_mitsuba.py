@@ -13,6 +13,7 @@ pytest.importorskip(
     "mitsuba",
     reason="Mitsuba 3 is absent: the drawn light was NOT checked against it (extra `mitsuba`)",
 )
+from bench.models.judged_finger import JudgedFinger
 from bench.models.mitsuba_finger import renderer
 from bench.optics import drawn_light
 
@@ -22,8 +23,8 @@ SAMPLES = 1.0 if os.environ.get("DRJIT_LIBLLVM_PATH") else 0.15
 
 
 @cache
-def finger() -> drawn_light.JudgedFinger:
-    return drawn_light.JudgedFinger.of_design()
+def finger() -> JudgedFinger:
+    return JudgedFinger.of_design()
 
 
 @cache
@@ -52,9 +53,12 @@ def test_the_change_of_each_colour_is_that_of_mitsuba(
 
 
 def test_slopes_alone_miss_the_shadow_of_a_bar() -> None:
-    """The same judge tells the picture without shadows from that with them."""
+    """The same judge tells the picture without shadows from that with them.
+
+    With fewer samples than these the noise of Mitsuba hides the difference.
+    """
     bare = replace(finger(), relief=False)
-    for found in drawn_light.compared(mitsuba(), bare, "bar", 0.2 * SAMPLES):
+    for found in drawn_light.compared(mitsuba(), bare, "bar", 0.2):
         assert found.correlation < 0.96
         assert found.residual > 0.12
 

@@ -27,7 +27,8 @@ def doctor(
     measures small force operators, which takes about ten seconds. The exit status is 0 even if
     something is missing.
     """
-    from gelslim.doctor import drawing, extras, kernels, missing_graphics, required, system, threads
+    from gelslim.doctor import drawing, extras, kernels, required, system, threads
+    from gelslim_cad.pictures.graphics_libraries import missing_graphics
     from gelslim_core import __version__
 
     with progress_bar(quiet=as_json) as tell:
