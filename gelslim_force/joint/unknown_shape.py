@@ -175,7 +175,7 @@ def unknown_shape(
     calibration: Calibration,
     reference: NDArray[np.uint8] | None,
     *,
-    gel: str = "auto",
+    gel: str = "linear",
     settings: JointSettings | None = None,
     light: LightCalibration | None = None,
     more: Sequence[tuple[Bundle, float]] = (),
