@@ -201,7 +201,8 @@ def unknown_shape(
     """
     gel = law_of(bundle, gel)
     chosen = settings or (MARKERS_ALONE if reference is None else JointSettings())
-    chosen = chosen.on_mesh(_cell_share(bundle))
+    if reference is not None:
+        chosen = chosen.on_mesh(_cell_share(bundle))
     if light is not None:
         chosen = chosen.with_light(light)
     followed, skin = calibration.reference, bundle.membranes
