@@ -179,6 +179,22 @@ class PictureSizes:
 
 
 @dataclass(frozen=True)
+class CorrectedPose:
+    """What the first correction of a hard pose by the law at large strain changes.
+
+    Attributes:
+        change: Difference of the contact on a linear gel to the corrected one, without a safety
+            factor.
+        moved_px: Largest displacement of a node, corrected.
+        force_n: Resultant of the contact, corrected.
+    """
+
+    change: Bound
+    moved_px: float
+    force_n: float
+
+
+@dataclass(frozen=True)
 class Probed:
     """What solving the hardest poses of a scene found, before it is planned.
 
@@ -194,6 +210,7 @@ class Probed:
         dot_mm_s: Largest speed of a dot, times a safety factor; infinite where it was not probed.
         together: By effect, its part of the error of leaving all these effects out at once. It
             holds for all of them and for no part of them.
+        corrected: Poses that were corrected by the law at large strain.
     """
 
     normal_n: float
@@ -204,6 +221,7 @@ class Probed:
     coarsest: Mapping[str, Bound] = field(default_factory=dict)
     dot_mm_s: float = math.inf
     together: Mapping[str, Bound] = field(default_factory=dict)
+    corrected: tuple[CorrectedPose, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
+from gelslim_twin.effects.circumstances import Circumstances, CorrectedPose, EffectParameters
 from gelslim_twin.effects.contact import moved_mm
 from gelslim_twin.effects.contact_estimate import RIDGES
 from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
@@ -63,6 +63,14 @@ SLIDING_PLACES = 4.0
 """`CORRECTED_PLACES` where walls slide and every path with a pose that cannot be corrected is
 converged: nodes slip a little earlier or later whatever the tolerance. The 55 other ones of 68
 random scenes reach 1.8 at `HELD_AT`."""
+LEFT, KEPT = 1 / 2, 1 / 3
+"""Of what a correction changes, the share that is taken to be left after it, and of the change that
+is expected of the next one, the share that it makes: what `corrected_contact` stops by."""
+FOUND_SAFETY, FOUND_BACK_SAFETY = 1.25, 2.5
+"""Factors on the error of rungs as a probe finds it, for presses and for paths that move aside."""
+ALIKE = 0.1
+"""Largest change by a correction, over the depth, at which linear and corrected gel have the same
+nodes at a wall of the tool: a node that is held on one and free on the other differs by much."""
 RIM_NODES, RIM_PLACES = 2, 2.0
 """Nodes that a sliding wall of the tool may hold on one gel and not on the other: their whole force
 counts, and as displacement this multiple of the depth. In random scenes two nodes and 1.5 times the
@@ -84,8 +92,52 @@ def corrected_error(c: Circumstances, tolerance: float) -> Bound:
 
     The tolerance is kept along the path, relative to the largest displacement and force. Which
     nodes a wall holds is decided by less than a loose one. Where walls slide a finer one than
-    `HELD_AT` promises no more.
+    `HELD_AT` promises no more. What a probe has found counts where it is less.
     """
+    promised, found = _promised_error(c, tolerance), found_error(c, tolerance)
+    return promised if found is None else promised.at_most(found)
+
+
+def found_error(c: Circumstances, tolerance: float) -> Bound | None:
+    """Error of the corrected contact as the corrections of a probe tell; None where they do not.
+
+    Of its own accord a path stops to correct a pose once what is left, `LEFT` of the last change,
+    is within the tolerance, and keeps what it has corrected until the next change is expected to
+    exceed it. Both errors are shares of what large strain changes, and so at most that.
+    """
+    poses = () if c.probed is None else c.probed.corrected
+    if not poses or _walls_slide(c):
+        return None
+    most_px = ALIKE * c.contact.depth_mm * c.sensor.px_per_mm
+    if c.has_walls and any(pose.change.displacement_px > most_px for pose in poses):
+        return None
+    error = Bound()
+    for pose in poses:
+        error = error.at_least(_error_at(pose, tolerance, c.motion.is_straight))
+    grows = c.motion.is_straight and not c.motion.recedes
+    return error.times(FOUND_SAFETY if grows else FOUND_BACK_SAFETY)
+
+
+def _error_at(pose: CorrectedPose, tolerance: float, is_straight: bool) -> Bound:
+    """Error of stopping and of keeping a correction.
+
+    In a press a change of the surface goes with one of the force, so that the stricter of the two
+    limits both. A contact that moves aside changes elsewhere than where the tolerance limits it.
+    """
+    change, n, px = pose.change, tolerance * pose.force_n, tolerance * pose.moved_px
+    if not is_straight:
+        most = geometry(px, n)
+        return change.times(LEFT).at_most(most).plus(change.at_most(most.times(KEPT)))
+    share = min(_ratio(px, change.displacement_px), _ratio(n, change.force_n))
+    return change.times(min(LEFT, share) + min(1.0, KEPT * share))
+
+
+def _ratio(most: float, change: float) -> float:
+    return most / change if change > 0 else math.inf
+
+
+def _promised_error(c: Circumstances, tolerance: float) -> Bound:
+    """The same without what the corrections of a probe tell."""
     slides = _walls_slide(c)
     tolerance = max(tolerance, HELD_AT) if slides else tolerance
     t, force_n = c.contact, tolerance * CORRECTED_FORCE * c.force_n

@@ -30,9 +30,9 @@ from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.contact.prony import PronySeries
 from gelslim_twin.contact.relaxation import at_rest, relax
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.effects.circumstances import MotionFigures, Probed
+from gelslim_twin.effects.circumstances import CorrectedPose, MotionFigures, Probed
 from gelslim_twin.effects.contact import RelaxationParameters
-from gelslim_twin.effects.effect import Bound, geometry, picture, rounded_up
+from gelslim_twin.effects.effect import OBSERVABLES, Bound, geometry, picture, rounded_up
 from gelslim_twin.effects.grey_values import MotionBlurParameters
 from gelslim_twin.effects.large_strain import RIM_NODES, RIM_PLACES
 from gelslim_twin.planning.planner import Question
@@ -110,7 +110,8 @@ def probed(
     if "friction" in effects and (free := probe.frictionless(steps)):
         held = [step.state for step in steps]
         sizes["friction"] = probe.largest(held, free, FRICTION_SAFETY)
-    if "nonlinearity" in effects and (hard := probe.corrections(steps)):
+    hard = probe.corrections(steps) if "nonlinearity" in effects else []
+    if hard:
         linear, strained = zip(*hard, strict=True)
         sizes["nonlinearity"] = probe.largest(linear, strained)
         if asked.circumstances.has_sliding_walls:
@@ -130,6 +131,7 @@ def probed(
         sizes,
         milliseconds,
         dot_mm_s=dot_mm_s,
+        corrected=tuple(probe.corrected_pose(*pair) for pair in hard),
     )
     if found.normal_n <= 0:
         return asked
@@ -276,18 +278,33 @@ class _Probe:
         force_safety: float = FORCE_SAFETY,
     ) -> Bound:
         """Largest differences of states in pairs, with the safety factors."""
-        scale = self.asked.circumstances.sensor.px_per_mm
-        force = places = dots = 0.0
+        found = Bound()
         for one, other in zip(ones, others, strict=True):
-            moved = one.displacement_mm - other.displacement_mm
-            lost = (one.force_n - other.force_n).sum(axis=0)
-            force = max(force, float(np.linalg.norm(lost)))
-            places = max(places, scale * float(np.linalg.norm(moved, axis=1).max()))
-            if self._to_markers is not None:
-                shift = np.linalg.norm(self._to_markers @ moved, axis=1)
-                dots = max(dots, scale * float(shift.max()))
-        found = (force * force_safety, *(p * PLACES_SAFETY for p in (places, dots, dots)))
-        return Bound(*(rounded_up(value) for value in found))
+            found = found.at_least(self.difference(one, other))
+        px = (found.displacement_px, found.markers_px, found.image_px)
+        values = (found.force_n * force_safety, *(p * PLACES_SAFETY for p in px))
+        return Bound(*(rounded_up(value) for value in values))
+
+    def difference(self, one: GelState, other: GelState) -> Bound:
+        """What two states differ by."""
+        scale = self.asked.circumstances.sensor.px_per_mm
+        moved = one.displacement_mm - other.displacement_mm
+        force_n = float(np.linalg.norm((one.force_n - other.force_n).sum(axis=0)))
+        places_px = scale * float(np.linalg.norm(moved, axis=1).max())
+        dots_px = 0.0
+        if self._to_markers is not None:
+            dots_px = scale * float(np.linalg.norm(self._to_markers @ moved, axis=1).max())
+        return Bound(force_n, places_px, dots_px, dots_px)
+
+    def corrected_pose(self, linear: GelState, strained: GelState) -> CorrectedPose:
+        """What the correction of a pose tells about the rungs of large strain."""
+        change = self.difference(linear, strained)
+        scale = self.asked.circumstances.sensor.px_per_mm
+        return CorrectedPose(
+            Bound.by_observable({o: rounded_up(change.of(o)) for o in OBSERVABLES}),
+            rounded_up(scale * float(np.abs(strained.displacement_mm).max())),
+            rounded_up(float(np.linalg.norm(strained.force_n.sum(axis=0)))),
+        )
 
 
 def _hardest(steps: Sequence[LinearStep]) -> list[LinearStep]:

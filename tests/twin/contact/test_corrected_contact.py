@@ -18,7 +18,12 @@ from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.effects.large_strain import CORRECTED_RUNGS, HELD_AT, corrected_error
+from gelslim_twin.effects.large_strain import (
+    CORRECTED_RUNGS,
+    HELD_AT,
+    corrected_error,
+    found_error,
+)
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.probe import probed
@@ -144,6 +149,41 @@ def test_a_path_is_converged_from_its_first_pose_on_where_one_is_not_corrected(
 OTHERS = (2013, 2026, 2028, 2038, 2040, 2059, 2107, 2204, 3020, 3028)
 SLIDING_WALLS = (2014, 2017, 2019, 2021, 2027, 2029, 2041, 2042, 2044, 2045, 2053, 2060, 2083, 2089,
                  2150, 2190, 2217)  # fmt: skip
+
+
+FOUND = (2003, 2030, 2037, 2048, 2056, 2065, 2074, 2090, 3002, 3018, 3044, 3060, 3075, 3102, 3165,
+         3180, 3202, 3206, 3238)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "seed", [2030, *(pytest.param(s, marks=pytest.mark.slow) for s in FOUND if s != 2030)]
+)
+def test_rungs_keep_what_one_correction_tells_of_them(tmp_path: Path, seed: int) -> None:
+    """The error that a probe finds of a rung, against a gel that is solved until it converges.
+
+    In 2074, 3044 and 3238 the tool recedes and comes back; in 2037, 2090, 3060, 3075, 3102, 3165
+    and 3180 it moves aside. 3102 and later seeds were not looked at for the safety factors, but
+    for 3238, in which 1.84 was needed.
+    """
+    finger, values = random_contact(seed)
+    for move in values["motion"]["waypoints"]:
+        move["steps"] *= 4
+    one = Trial.of(finger, values, tmp_path)
+    asked = replace(one.asked, observe=("force", "displacement"))
+    c = probed(asked, one.loaded, one.compliance, ("nonlinearity",)).circumstances
+    tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
+
+    def solver() -> ContactSolver:
+        return ContactSolver(one.compliance, tool, ContactSettings(1e-5, c.friction))
+
+    true = list(NonlinearContact(solver(), 1e-3).states(one.poses))
+    for tolerance in (0.1, 0.03, HELD_AT):
+        found = found_error(c, tolerance)
+        assert found is not None
+        rung = CorrectedContact(solver(), tolerance, not c.has_walls)
+        n, mm = apart(list(rung.states(one.poses)), true)
+        assert n <= found.force_n, tolerance
+        assert mm * c.sensor.px_per_mm <= found.displacement_px, tolerance
 
 
 @pytest.mark.slow

@@ -10,11 +10,23 @@ import numpy as np
 import pytest
 from effect_samples import BOUND, FIGURES, LADDER, MOTION, ball, circumstances, values
 
-from gelslim_twin.effects.circumstances import MotionFigures, Probed, SensorFigures
+from gelslim_twin.effects.circumstances import (
+    Circumstances,
+    CorrectedPose,
+    MotionFigures,
+    Probed,
+    SensorFigures,
+)
 from gelslim_twin.effects.contact import moved_mm
 from gelslim_twin.effects.effect import Bound, Rung, geometry, optics, picture
 from gelslim_twin.effects.grey_values import MotionBlurParameters, ShadingParameters, grey_share
-from gelslim_twin.effects.large_strain import CORRECTED_RUNGS, HELD_AT, corrected_error
+from gelslim_twin.effects.large_strain import (
+    ALIKE,
+    CORRECTED_RUNGS,
+    HELD_AT,
+    corrected_error,
+    found_error,
+)
 
 REFERENCE = replace(
     FIGURES,
@@ -201,6 +213,54 @@ def test_errors_at_sliding_walls_follow_what_friction_drags() -> None:
         fine = corrected_error(c, HELD_AT)
         assert fine.displacement_px == pytest.approx(0.02 * most_mm * FIGURES.px_per_mm)
     assert corrected_error(held, HELD_AT).markers_px > fine.markers_px
+
+
+CHANGE = Bound(0.04, 0.5, 0.3, 0.3)
+"""What the first correction changes of a contact that moves by 10 px and has 2 N."""
+PRESSED = replace(MOTION, lateral_mm=0.0, twist_deg=0.0, tilt_deg=0.0)
+
+
+def corrected(
+    change: Bound = CHANGE, motion: MotionFigures = PRESSED, steepest: float = 0.5
+) -> Circumstances:
+    found = Probed(2.0, 2.0, 0.4, {}, corrected=(CorrectedPose(change, 10.0, 2.0),))
+    tool = replace(ball(14.0), steepest=lambda _d: steepest)
+    return replace(circumstances(0.3, motion=motion, footprint=tool), probed=found)
+
+
+def test_a_correction_tells_what_looser_rungs_leave_and_keep() -> None:
+    """A press: 1 % of 2 N is half of 0.04 N, and 1 % of 10 px a fifth of 0.5 px, the stricter.
+
+    A fifth of the change is left where the path stops, a third of that where it does not correct.
+    """
+    found = found_error(corrected(), 0.01)
+    assert values(found) == pytest.approx(values(CHANGE.times(1.25 * (0.2 + 0.2 / 3))))
+    # Half is left after one correction at most, and all of the change where there is none.
+    assert values(found_error(corrected(), 1.0)) == pytest.approx(values(CHANGE.times(1.25 * 1.5)))
+    # Aside each observable has its own limit: 0.5, and 0.1 of 0.3 px.
+    aside = values(found_error(corrected(motion=replace(PRESSED, lateral_mm=0.2)), 0.01))
+    expected = (0.02 + 0.02 / 3, 0.1 + 0.1 / 3, 0.1 + 0.1 / 3, 0.1 + 0.1 / 3)
+    assert aside == pytest.approx([2.5 * e for e in expected])
+    back = found_error(corrected(motion=replace(PRESSED, recedes=True)), 0.01)
+    assert values(back) == pytest.approx([2 * value for value in values(found)])
+
+
+def test_what_is_found_of_rungs_only_lowers_what_they_promise() -> None:
+    for tolerance, _ in CORRECTED_RUNGS:
+        c = corrected()
+        blind = replace(c, probed=replace(c.probed, corrected=()))
+        known, promised = corrected_error(c, tolerance), corrected_error(blind, tolerance)
+        assert known == promised.at_most(found_error(c, tolerance))
+        assert known.displacement_px < promised.displacement_px
+
+
+def test_corrections_tell_nothing_of_walls_that_slide_or_hold_other_nodes() -> None:
+    depth_px = corrected().contact.depth_mm * FIGURES.px_per_mm
+    alike, other = (Bound(0.04, f * ALIKE * depth_px, 0.1, 0.1) for f in (0.99, 1.01))
+    assert found_error(corrected(alike, steepest=math.inf), 0.02) is not None
+    assert found_error(corrected(other, steepest=math.inf), 0.02) is None
+    assert found_error(corrected(other), 0.02) is not None
+    assert found_error(corrected(alike, MOTION, math.inf), 0.02) is None
 
 
 def test_only_paths_of_sliding_walls_are_solved_anew() -> None:

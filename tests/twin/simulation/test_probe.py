@@ -10,8 +10,10 @@ import pytest
 from agreement import Trial
 from random_contact_scenes import Values, random_contact
 from scene_samples import GALLERY, MINIMAL, SENSOR, load
+from scipy.sparse.linalg import spsolve
 from sim_rig import small_sensor
 
+from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_twin.contact.corrected_contact import CorrectedContact
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.nonlinear import NonlinearContact
@@ -183,6 +185,34 @@ def test_a_plan_with_a_probe_keeps_less_and_keeps_the_tolerance(folder: Path) ->
     loose = replace(asked, force_n=1.5 * choice.size.force_n)
     assert "nonlinearity" in make_plan(loose).order
     assert "nonlinearity" not in planned(loaded, loose, lambda: pad).order
+
+
+def test_the_corrected_pose_is_that_of_a_path_that_is_corrected_once(folder: Path) -> None:
+    """The deepest pose on a linear gel, and its load step again from what the law leaves there."""
+    loaded = scene(folder, 0.012)
+    asked = question(loaded, bundle_figures(folder / "bundle"))
+    pad = SurfaceCompliance(load_bundle(folder / "bundle"))
+    found = probed(asked, loaded, pad, ("nonlinearity",)).circumstances.probed
+    assert found is not None
+    (pose,) = found.corrected
+    tool = Tool.of(loaded.scene.indenters, loaded.folder, 0)
+    solver = ContactSolver(pad, tool, ContactSettings(1e-5, 0.5))
+    path = probed_poses(loaded.poses, is_straight=True)
+    *_, last, linear = solver.states(path)
+    law = FiniteStrainForce(pad.bundle, tolerance=1e-4)
+    lost_n = law.force(linear.displacement_mm) - linear.force_n
+    load = np.zeros((len(pad.bundle.mesh.free), 3))
+    load[-len(lost_n) :] = lost_n
+    free_mm = -spsolve(pad.system.stiffness.tocsc(), load.ravel()).reshape(-1, 3)[-len(lost_n) :]
+    strained = solver.step(last, path[-2], path[-1], free_mm, linear)
+    scale = asked.circumstances.sensor.px_per_mm
+    moved = np.linalg.norm(strained.displacement_mm - linear.displacement_mm, axis=1)
+    apart_n = np.linalg.norm((strained.force_n - linear.force_n).sum(axis=0))
+    assert pose.change.force_n == pytest.approx(apart_n, rel=0.05)
+    assert pose.change.displacement_px == pytest.approx(scale * moved.max(), rel=0.05)
+    assert pose.force_n == pytest.approx(np.linalg.norm(strained.force_n.sum(axis=0)), rel=0.02)
+    most_px = scale * np.abs(strained.displacement_mm).max()
+    assert pose.moved_px == pytest.approx(most_px, rel=0.02)
 
 
 def long_scene(seed: int) -> tuple:
