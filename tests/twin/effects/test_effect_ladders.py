@@ -370,3 +370,18 @@ def test_exact_rungs_have_no_error() -> None:
                  "specular", "exposure", "sensor_noise", "compression"):  # fmt: skip
         assert [rung.error for rung in LADDER[name](c)] == [Bound()], name
     assert [rung.error for rung in LADDER["lens_distortion"](c)] == [Bound()]
+
+
+def test_rims_of_wide_tools_that_are_raised_with_friction_promise_more() -> None:
+    """Nodes at the rim stick or slip otherwise on the way out: scenes 2122 and 2356."""
+    c = corrected(steepest=math.inf, motion=replace(PRESSED, recedes=True))
+    # A gel that is so thin that the tool is wide.
+    wide = replace(c, sensor=replace(c.sensor, thickness_mm=c.contact.radius_mm / 4.1))
+    assert wide.contact.radius_mm > 4 * wide.sensor.thickness_mm
+    free = replace(wide, friction=0.0)
+    assert wide.friction > 0
+    assert found_error(wide, HELD_AT) is None
+    assert found_error(free, HELD_AT) is not None
+    blind = replace(free, probed=replace(free.probed, corrected=()))
+    usual, more = corrected_error(blind, HELD_AT), corrected_error(wide, HELD_AT)
+    assert more.displacement_px == pytest.approx(3 * usual.displacement_px, rel=0.2)
