@@ -99,7 +99,7 @@ def _beaten(ladder: LadderRecord) -> str:
     (ours,) = ladder.ours
     finer = [r for r in ladder.fronts[0] if r.error < ours.error / ALIKE]
     if not finer or ours.error == 0:
-        return "No other measured rung is more accurate."
+        return "No other rung of its front is more accurate."
     nxt, best = finer[0], finer[-1]
     text = (
         f"The next more accurate rung, {nxt.label}, takes {times(nxt.time / ours.time)} the time "
