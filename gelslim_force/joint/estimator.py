@@ -51,8 +51,8 @@ _LEAST_NODES, _CLOSE = 3, 1
 """The latter: steps about the contact within which heights at half the pitch count."""
 _ROUGH_TOLERANCE = 2e-4  # of forces on the nodes that those at half the pitch follow
 _SETTLED, _FAR, _LOST = 0.01, 0.2, 0.03
-"""Shares of the force: another linearisation changes little below the first change; one is needed
-above the second, since the frame before, and above the third, on nodes of a deep contact left."""
+"""Shares of the force. A change below the first one ends the linearisations. One more is needed for
+a change above the second one since the last frame, and if nodes with the third one are left out."""
 _HELD_SLOPE = 0.07
 """Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
 random contacts then differ from those of another linearisation by 0.03 standard deviations in the

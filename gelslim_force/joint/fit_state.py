@@ -133,7 +133,7 @@ class FitState:
 
     @property
     def depth_mm(self) -> float:
-        """How far the contact is pressed in."""
+        """Depth of the contact: how far its lowest node has moved down."""
         return -float(self.near_mm.min(initial=0.0))
 
     def linear_mm(self, nodes: NDArray[np.intp], near: NDArray[np.bool_]) -> Array:
@@ -154,7 +154,7 @@ class FitState:
         return motion.linear_mm - move(others, self.force_n[others])
 
     def share_beside(self, nodes: Mask) -> float:
-        """Resultant of the forces on all but some nodes (c,), over the whole one."""
+        """Size of the resultant on all nodes but these (c,), over that on all nodes."""
         beside, whole = self.force_n[~nodes].sum(axis=0), self.force_n.sum(axis=0)
         return float(np.linalg.norm(beside) / max(float(np.linalg.norm(whole)), 1e-12))
 

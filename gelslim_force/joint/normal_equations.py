@@ -142,7 +142,7 @@ class Linearised:
         nodes: (p,) those whose forces are sought.
         start: (3p,) their forces to start from.
         moved_mm: (c, 3) motion of the surface in the estimate.
-        excess: What of it a linear gel would not move.
+        excess: The part of it by which a gel at large strain moves further.
         gain: Of the light in the estimate.
         deepness: Of the contact in the estimate.
         equations: Of the data, without a prior.

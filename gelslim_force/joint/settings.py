@@ -119,11 +119,15 @@ class JointSettings:
     def on_mesh(self, share: float) -> JointSettings:
         """The settings with light for a mesh, whatever the size of its cells.
 
-        A traction that is limited in size from node to node is so in its integral over the area.
-        Reaches in steps of the nodes are lengths.
+        Smaller cells have more nodes on the same area. Limits of the traction of a node grow as the
+        side of a cell falls, so that the limit of the mean square over an area stays the same.
+        Reaches in steps of the nodes grow too, so that they are the same lengths.
 
         Args:
             share: Side of a cell over the thickness of the gel.
+
+        Returns:
+            The settings; these ones where the side is `USUAL_CELL` of the thickness.
         """
         finer = USUAL_CELL / share
         return replace(
