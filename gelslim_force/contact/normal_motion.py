@@ -13,7 +13,7 @@ from gelslim_force.contact.normal_compliance import Compliant, NormalCompliance
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch, rotated
 from gelslim_force.contact.patch_finder import PatchFinder
-from gelslim_force.contact.shading_change import LostColourError
+from gelslim_force.contact.shading_change import MOST_FAINT, TOO_FAINT, LostColourError
 from ifem_export.compliance.contact_columns import ContactCompliance
 
 Array = NDArray[np.float64]
@@ -261,9 +261,10 @@ class IndenterSource:
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | str | None:
         """The patch of a frame whose markers are at (n, 2), or why none can be seen."""
         try:
-            return self.finder.find(image, markers_px)
+            light = self.finder.change(image, markers_px)
         except LostColourError as error:
             return str(error)
+        return TOO_FAINT if light.faint > MOST_FAINT else self.finder.patch_in(light)
 
     def motion(
         self, seen: ContactPatch | str | None, lateral_mm: Array | None = None

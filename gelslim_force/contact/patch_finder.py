@@ -103,8 +103,6 @@ class PatchFinder:
     ) -> ContactPatch | None:
         """Find the patch in a frame.
 
-        The patch of the last frame is followed, for speed, as long as it fits as well as before.
-
         Args:
             image: The frame, of the shape of the reference.
             markers_px: (m, 2) markers in the frame, which are left out too; NaN for lost ones.
@@ -115,7 +113,13 @@ class PatchFinder:
         Raises:
             ValueError: The frame has another shape than the reference.
         """
-        light = self.change(image, markers_px)
+        return self.patch_in(self.change(image, markers_px))
+
+    def patch_in(self, light: ShadingChange) -> ContactPatch | None:
+        """The patch that the change of the light in a frame shows, None without contact.
+
+        The patch of the last frame is followed, for speed, as long as it fits as well as before.
+        """
         region, contrast = changed_region(light)
         if region is None:
             self._last = None

@@ -39,6 +39,21 @@ _OPAQUE = 0.75
 """Share of its light that every colour keeps at a tilt of the gel: light from two sides loses less
 than this in the brighter of the two. Darker is dirt on the gel or on the window."""
 
+_ROWS = 4
+"""Rows of bins for one that is read for their usual noise."""
+_CLEAR = 0.02
+"""Noise of a bin up to which the light shows what it shows in pictures that are not compressed. At
+0.05 to 0.08 presses of 0.08 to 0.11 N are not seen."""
+_EXACT, _JUMPS = 5e-4, 0.005
+"""Noise of a single bin below which most are what they were in the reference, and that of blocks
+from which these jump: what was rounded in both pictures is not known to be right between jumps."""
+MOST_FAINT = 2.0
+"""Value of `ShadingChange.faint` beyond which a contact may be hidden."""
+TOO_FAINT = (
+    "the picture is compressed so strongly that its light may hide a contact or a part of one: let "
+    "the camera compress less"
+)
+
 
 class LostColourError(GelslimError, ValueError):
     """A grey picture of a camera whose reference has colour."""
@@ -60,6 +75,20 @@ class ShadingChange:
     grain: Array | None = None
     """(c,) the noise over that of a single bin: with it means over many bins hold, also where bins
     share their errors as in compressed pictures; see `noise_grain`. None for 1."""
+
+    @property
+    def faint(self) -> float:
+        """Least change of the light that shows a contact, over the usual one.
+
+        It is above 1 only where bins share their errors, and infinite where these are not known.
+        """
+        if self.grain is None or not self.grain[:2].max() > 1:
+            return 1.0
+        some = self.noise[:2, ::_ROWS][:, self.valid[::_ROWS]]
+        noise = np.median(some, axis=1)
+        if (noise < _EXACT * self.grain[:2]).any() and noise.max() > _JUMPS:
+            return np.inf
+        return max(1.0, float(noise.max()) / _CLEAR)
 
 
 class ShadingReference:

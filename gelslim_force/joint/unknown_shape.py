@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import FoundForces, NormalReading
-from gelslim_force.contact.shading_change import LostColourError
+from gelslim_force.contact.shading_change import MOST_FAINT, TOO_FAINT, LostColourError
 from gelslim_force.forces.finite_strain import deep_mm, law_of
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator
@@ -61,11 +61,6 @@ _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the lig
 _UNCERTAIN = (
     "the markers alone show the normal force as {:.2g} N with a standard deviation of {:.2g} N, "
     "which is more than {:.0%} of it: it is unknown"
-)
-_MOST_FAINT = 2.0
-_COARSE = (
-    "the picture is compressed so strongly that its light may hide a contact or a part of one: let "
-    "the camera compress less"
 )
 _MOST_SIGMAS = 4
 _OTHER_GAIN = (
@@ -119,9 +114,9 @@ class UnknownShape:
         last, self._last = self._last, None
         try:
             frame = self.estimator.frame(image, markers_px, noise)
-            self._faint = 1.0 if frame.seen is None else frame.seen.faint
-            if self._faint > _MOST_FAINT:
-                return _COARSE
+            self._faint = 1.0 if frame.seen is None else frame.seen.shading.faint
+            if self._faint > MOST_FAINT:
+                return TOO_FAINT
             found = self.estimator.estimate(frame, last)
             if found is not None and last is not None and not self._explains(found):
                 # The frame before was spoiled, or showed another contact.

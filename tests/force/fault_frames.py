@@ -1,4 +1,4 @@
-"""Pictures that something has spoiled: covered, lit, torn, compressed or miscoloured.
+"""Pictures that something has spoiled: covered, lit, torn, compressed, turned or miscoloured.
 
 Each fault is a function of a picture (h, w, 3) uint8 and a random generator. It returns another
 picture of the same size. `OTHER` frames keep nothing of the picture.
@@ -183,11 +183,45 @@ def dirt(image: Picture, rng: Rng) -> Picture:
     return _picture(gaussian_filter(found, (1, 1, 0)))
 
 
+def turned(image: Picture, rng: Rng) -> Picture:
+    """Upside down."""
+    return np.ascontiguousarray(image[::-1, ::-1])
+
+
+def mirrored(image: Picture, rng: Rng) -> Picture:
+    """Mirrored from left to right, or from top to bottom."""
+    return np.ascontiguousarray(np.flip(image, int(rng.integers(2))))
+
+
+def shifted(image: Picture, rng: Rng) -> Picture:
+    """Shifted as by a knock of the camera: by one to 80 px, of which a pitch is 24."""
+    size, angle = np.exp(rng.uniform(0, np.log(80))), rng.uniform(0, 2 * np.pi)
+    across, down = np.rint(size * np.array([np.cos(angle), np.sin(angle)])).astype(int)
+    y, x = (np.clip(np.arange(n) - by, 0, n - 1) for n, by in zip(image.shape, (down, across)))
+    return image[y[:, None], x]
+
+
+def wrong_dots(image: Picture, rng: Rng) -> Picture:
+    """Some dots have worn off, and specks that look like dots lie elsewhere."""
+    height, width = image.shape[:2]
+    found = image.astype(float)
+    y, x = np.mgrid[:height, :width]
+    for speck in range(int(rng.integers(2, 16))):
+        at, radius = rng.uniform(20, [height - 20, width - 20]), rng.uniform(4, 7)
+        away = np.hypot(y - at[0], x - at[1])
+        if speck % 2:
+            found[away < radius] *= 0.3
+        else:
+            wide = away < 14
+            found[wide] = np.quantile(found[wide], 0.8, axis=0)
+    return _picture(gaussian_filter(found, (0.7, 0.7, 0)))
+
+
 FAULTS: dict[str, Fault] = {
     f.__name__: f
     for f in (
         black_side, hand, glare, soft_glare, torn, frozen_rows, compressed, other_scene, even,
         grey, swapped_colours, colours_apart, light_uneven, lamp_out, exposure, defocused, noisy,
-        dirt,
+        dirt, turned, mirrored, shifted, wrong_dots,
     )
 }  # fmt: skip

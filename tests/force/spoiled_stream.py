@@ -1,19 +1,21 @@
 """A stream of presses and releases with faults at random, and what a pipeline makes of it.
 
-Pictures are drawn once for each press and share of its depth. Each frame has noise of its own; a
-fault begins in one of 15 frames and lasts for up to four.
+Pictures are drawn once for each press and share of its depth. Each frame has noise of its own, and
+the camera creeps slowly against the gel; a fault begins in one of 15 frames and lasts for up to
+four.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from fault_frames import FAULTS
 from numpy.typing import NDArray
 from pressed_samples import Pressed, calibration, lit_bundle
+from scipy.ndimage import shift
 from shaded_frames import shaded
 
 from gelslim_force.joint.settings import JointSettings
@@ -23,6 +25,10 @@ Picture = NDArray[np.uint8]
 RECOVERY = 2
 """Frames after a fault until the force is right again."""
 MOST_SIGMAS = 4.0
+CREEP_PX, CREEP_FRAMES = 0.35, 4000
+"""Largest shift by creep, and frames from there to the other side and back."""
+_CREEP_TO = np.array([0.6, 0.8])
+_CREEP_STEPS = 8
 _BEGIN = 1 / 15
 _NOISE = 1.5
 
@@ -34,6 +40,29 @@ class StreamFrame:
     image: Picture
     force_n: NDArray[np.float64]
     fault: str
+
+
+class Creeping:
+    """A picture seen by a camera that creeps.
+
+    Between two shifts that are a tenth of a pixel apart it is interpolated linearly.
+    """
+
+    def __init__(self, image: Picture) -> None:
+        self._steps = np.linspace(-CREEP_PX, CREEP_PX, _CREEP_STEPS)
+        rows, columns = _CREEP_TO
+        self._shifted = [
+            shift(image.astype(np.float32), (rows * by, columns * by, 0), mode="nearest")
+            for by in self._steps
+        ]
+
+    def at(self, number: int) -> NDArray[np.float32]:
+        """In a frame of the stream, counted from 0."""
+        place = np.sin(2 * np.pi * number / CREEP_FRAMES) * CREEP_PX
+        step = (place - self._steps[0]) / (self._steps[1] - self._steps[0])
+        first = min(int(step), _CREEP_STEPS - 2)
+        share = np.float32(step - first)
+        return (1 - share) * self._shifted[first] + share * self._shifted[first + 1]
 
 
 @dataclass
@@ -86,13 +115,14 @@ def stream(
     rng = np.random.default_rng(seed)
     noise = np.rint(rng.normal(0, _NOISE, still[0].image.shape)).astype(np.int16)
     scenes = _scenes(still, presses, rng)
+    creeping = {id(s): Creeping(s.image) for s in (*still, *(p for pair in presses for p in pair))}
     fault, left, own = "", 0, 0
-    for _ in range(count):
+    for number in range(count):
         scene = next(scenes)
         if left == 0 and rng.random() < _BEGIN:
             fault, left = str(rng.choice(list(FAULTS))), int(rng.integers(1, 5))
             own = int(rng.integers(2**31))
-        image = _noisy(scene.image, noise, rng)
+        image = _noisy(creeping[id(scene)].at(number), noise, rng)
         if left > 0:
             # A fault keeps its shape from frame to frame.
             image = FAULTS[fault](image, np.random.default_rng(own))
@@ -113,9 +143,17 @@ def _scenes(
         yield half
 
 
-def _noisy(image: Picture, noise: NDArray[np.int16], rng: np.random.Generator) -> Picture:
+def _noisy(
+    image: NDArray[np.float32], noise: NDArray[np.int16], rng: np.random.Generator
+) -> Picture:
     moved = np.roll(noise, int(rng.integers(len(noise))), axis=0)
-    return np.clip(image + moved, 0, 255).astype(np.uint8)
+    return np.clip(np.rint(image + moved), 0, 255).astype(np.uint8)
+
+
+def mono(frames: Iterator[StreamFrame]) -> Iterator[StreamFrame]:
+    """The same frames as a camera without colour gives them."""
+    for frame in frames:
+        yield replace(frame, image=np.rint(frame.image.mean(axis=2)).astype(np.uint8))
 
 
 def soak(chain: ForcePipeline, frames: Iterator[StreamFrame]) -> Soak:

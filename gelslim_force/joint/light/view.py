@@ -29,12 +29,6 @@ _SHOWN = 0.25
 _QUIET, _ROWS = 3.0, 4
 """Standard deviations up to which a bin's change is noise, and rows of bins for one that is read
 for the correlation of the noise."""
-_CLEAR = 0.02
-"""Noise of a bin up to which the light shows what it shows in pictures that are not compressed. At
-0.05 to 0.08 presses of 0.08 to 0.11 N are not seen."""
-_EXACT, _JUMPS = 5e-4, 0.005
-"""Noise of a single bin below which most are what they were in the reference, and that of blocks
-from which these jump: what was rounded in both pictures is not known to be right between jumps."""
 _DISC, _RIM_PX = 1.5, 1.0
 """A marker's pixels, over its radius and beyond it, that are left out."""
 
@@ -56,21 +50,6 @@ class SeenLight:
     noise: Array
     saturated: Mask
     independent: float
-
-    @property
-    def faint(self) -> float:
-        """Least change of the light that shows a contact, over the usual one.
-
-        It is above 1 only where bins share their errors, and infinite where these are not known.
-        """
-        shading = self.shading
-        if shading.grain is None or not shading.grain[:2].max() > 1:
-            return 1.0
-        some = shading.noise[:2, ::_ROWS][:, shading.valid[::_ROWS]]
-        noise = np.median(some, axis=1)
-        if (noise < _EXACT * shading.grain[:2]).any() and noise.max() > _JUMPS:
-            return np.inf
-        return max(1.0, float(noise.max()) / _CLEAR)
 
 
 class LightView:

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import uniform_filter
 
 from gelslim_force.contact.shading_change import ShadingChange
-from gelslim_force.joint.light.view import SeenLight, independent_noise
+from gelslim_force.joint.light.view import independent_noise
 from gelslim_force.joint.region import changed_bins
 
 SHAPE = 2, 120, 160
@@ -64,14 +64,9 @@ def test_a_contact_is_found_among_errors_of_blocks_and_they_are_none() -> None:
     assert pressed[~inside].mean() < 0.02
 
 
-def light(shading: ShadingChange) -> SeenLight:
-    none = np.zeros(SHAPE)
-    return SeenLight(shading, none, none, none.astype(bool), 1.0)
-
-
 def test_contacts_are_fainter_among_errors_that_bins_share() -> None:
-    assert light(shading(np.random.default_rng(7).normal(0, 0.05, SHAPE))).faint == 1.0
-    assert light(coarse(0.015, 1.5)).faint == 1.0
-    assert light(coarse(0.04, 2.0)).faint == pytest.approx(2.0)
-    assert light(coarse(0.02, 200.0)).faint == np.inf
-    assert light(coarse(0.004, 20.0)).faint == 1.0
+    assert shading(np.random.default_rng(7).normal(0, 0.05, SHAPE)).faint == 1.0
+    assert coarse(0.015, 1.5).faint == 1.0
+    assert coarse(0.04, 2.0).faint == pytest.approx(2.0)
+    assert coarse(0.02, 200.0).faint == np.inf
+    assert coarse(0.004, 20.0).faint == 1.0
