@@ -70,7 +70,7 @@ class ContactMotion:
         clock.stage("normal")
         motion = motion_of(positions_px, reading)
         clock.stage("displace")
-        problem = self._contradiction(seen, reading, motion) or self._covered(reading, tracked)
+        problem = self._contradiction(reading, motion) or self._covered(reading, tracked)
         if problem:
             return replace(reading, problem=problem), motion_of(positions_px, None)
         lateral = self._motion.in_contact(motion, reading)
@@ -83,9 +83,10 @@ class ContactMotion:
             clock.stage("displace")
         return self._with_hidden(reading, tracked), motion
 
-    def _contradiction(self, seen: Any, reading: NormalReading, motion: Array) -> str:
+    def _contradiction(self, reading: NormalReading, motion: Array) -> str:
         """Why motion (n, 3) and contact do not agree; empty if they do."""
-        if seen is None and self._motion.moved(motion):
+        free = reading.known and reading.touched is not None and not reading.touched.any()
+        if free and self._motion.moved(motion):
             # The gel moves although no patch is seen: zero force would be a false statement.
             return frame_problems.NO_PATCH
         ratio = self._motion.apparent_over_seen(motion, reading)

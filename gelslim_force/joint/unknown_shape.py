@@ -57,6 +57,9 @@ Array = NDArray[np.float64]
 _FINER_TO = 1.6
 """Depth to which a linear gel is fitted at half the pitch, over that from which it is deep."""
 LARGEST_UNEXPLAINED = 0.7
+_NOT_OF_THE_GEL = 0.45
+"""Share of the change of light that forces leave unexplained from which light around lost markers
+may be that of something before the gel, such as a finger."""
 _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the light unexplained"
 _UNCERTAIN = (
     "the markers alone show the normal force as {:.2g} N with a standard deviation of {:.2g} N, "
@@ -160,8 +163,9 @@ class UnknownShape:
             seen.by_gel,
         )
         depth = max(0.0, -float(height.min()))
+        shown = seen.shown if seen.unexplained < _NOT_OF_THE_GEL else None
         return NormalReading(
-            height, np.zeros(count), seen.region, depth_mm=depth, forces=forces, shown=seen.shown
+            height, np.zeros(count), seen.region, depth_mm=depth, forces=forces, shown=shown
         )
 
 
