@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Kind = TypeVar("Kind", bound=np.generic)
+_MAPPINGS = (dict, Mapping)
 
 
 def frozen(array: NDArray[Kind]) -> NDArray[Kind]:
@@ -35,7 +36,7 @@ class Immutable:
         for name, value in values.items():
             if isinstance(value, np.ndarray):
                 values[name] = frozen(value)
-            elif isinstance(value, dict | Mapping):
+            elif isinstance(value, _MAPPINGS):
                 values[name] = MappingProxyType(dict(value))
 
     def __getstate__(self) -> dict[str, Any]:

@@ -157,6 +157,9 @@ class DriftFilter:
         self._reference, self._settings = reference, settings
         self.field = FarField(reference)
         self._unit = np.array([1.0, 1.0, *(1 / self.field.arm_px**2,) * 2])
+        self._leaking = self._unit * _LEAK_SHAPE**2
+        self._walk = np.diag(self._spread(settings.walk_px))
+        self._jump = _JUMP_SIGMAS**2, self._spread(_UNKNOWN_PX)
         self.log: tuple[TareRecord, ...] = ()
         self._rest, self._told = Similarity(), 0
         self.reset()
@@ -194,7 +197,7 @@ class DriftFilter:
         noise = max(noise_px, LEAST_NOISE_PX)
         seen = tracks.tracked if self.loaded is None else tracks.tracked & ~self.loaded
         found = self.field.fitted(tracks.displacement_px, seen, noise, self._drift)
-        self._covariance = self._covariance + np.diag(self._spread(self._settings.walk_px))
+        self._covariance = self._covariance + self._walk
         if found is None:
             self._still = []
             return self._found(tracks, None, np.zeros((4, len(tracks), 2)), self._remaining())
@@ -208,7 +211,7 @@ class DriftFilter:
             found.similarity.vector,
             solution,
             (noise**2, self._leak(found.leak_px)),
-            (_JUMP_SIGMAS**2, self._spread(_UNKNOWN_PX)),
+            self._jump,
         )
         self._drift = Similarity.of(vector)
         gain = share @ solution
@@ -222,7 +225,9 @@ class DriftFilter:
 
     def _remaining(self) -> Array:
         """(4, 4) covariance of the drift by the frames before and by the load's own motion."""
-        return np.asarray(self._covariance + np.diag(self._leak(self._bias_px)))
+        found = self._covariance.copy()
+        found.flat[::5] += self._leak(self._bias_px)
+        return found
 
     def tare(self, frame: FrameDrift, tracks: Tracks, time_s: float) -> TareRecord:
         """Take the drift of a frame as the new rest.
@@ -290,7 +295,7 @@ class DriftFilter:
                 tracks.positions_px, Similarity.of(self._drift.vector - left)
             ),
             gain=share * gain,
-            covariance=covariance + np.outer(left, left),
+            covariance=covariance + left[:, None] * left,
             problem=self._excess(),
             untouched=found is not None and found.untouched and not np.any(self.loaded),
             residual_px=float("nan") if found is None else found.residual_px,
@@ -332,4 +337,4 @@ class DriftFilter:
 
     def _leak(self, sigma_px: float) -> Array:
         """(4,) variances by what the load itself moves the free markers."""
-        return np.asarray(self._spread(sigma_px) * _LEAK_SHAPE**2)
+        return np.asarray(self._leaking * sigma_px**2)

@@ -11,12 +11,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from ifem_export.assembly.occupancy_table import occupancy_table
 from ifem_export.operators.adjoint_fields import AdjointFields
+from ifem_export.operators.layer_coupling import BESIDE, Coupling, Stencil, coupling, stencil
 from ifem_export.operators.pad_system import PadSystem, checked_field
 from ifem_export.operators.solver import Solver, SparseFactor, matrix_bytes, pad_solver
 
@@ -53,21 +52,17 @@ class PaperOperator(_WithCompliance):
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """K_ss u."""
-        from ifem_export.operators.surface_kernel import apply_stencil
-
         u = checked_field(displacement_mm, self.system.columns)
         if self._assembled:
             return np.asarray(self.system.stiffness @ u.ravel()).reshape(-1, 3)
-        force = np.empty_like(u)
-        apply_stencil(*self._stencil, np.vstack([u, np.zeros((1, 3))]), force)
-        return force
+        return self._stencil.force(np.vstack([u, np.zeros((1, 3))]))
 
     @property
     def n_bytes(self) -> int:
         """Bytes of the stencil, or of the matrix where the stencil does not hold."""
         if self._assembled:
             return matrix_bytes(self.system.stiffness)
-        return int(sum(part.nbytes for part in self._stencil))
+        return self._stencil.n_bytes
 
     @property
     def _assembled(self) -> bool:
@@ -75,18 +70,8 @@ class PaperOperator(_WithCompliance):
         return self.system.mesh.fill is not None or bool(self.system.membranes)
 
     @cached_property
-    def _stencil(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-        """Type of each node, its neighbours (c where absent) and the blocks of each type."""
-        s = self.system
-        masks = s.mesh.numbering.masks[s.columns :]
-        kinds, types = np.unique(masks, return_inverse=True)
-        table = occupancy_table(np.asarray(s.element_matrix))[kinds][:, 9:18]
-        rows, columns = s.lattice_positions.T
-        lattice = np.full(s.mesh.numbering.shape[1:], s.columns, dtype=np.int64)
-        lattice[rows, columns] = np.arange(s.columns)
-        windows = sliding_window_view(np.pad(lattice, 1, constant_values=s.columns), (3, 3))
-        blocks = np.ascontiguousarray(table.transpose(0, 2, 3, 1))
-        return types.astype(np.int64), windows[rows, columns].reshape(-1, 9), blocks
+    def _stencil(self) -> Stencil:
+        return stencil(self.system, 0, BESIDE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +88,14 @@ class CondensedOperator(_WithCompliance):
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """F = K_ss u + K_si u_i, where K_ii u_i = -K_is u."""
-        u = checked_field(displacement_mm, self.system.columns).ravel()
-        inner = self.inner_solver.solve(-(self.system.surface_to_inner @ u), self.rtol).x
-        force = np.asarray(self.system.surface @ u + self.system.inner_to_surface @ inner)
-        force = force.reshape(-1, 3)
+        u = checked_field(displacement_mm, self.system.columns)
+        inner = self.inner_solver.solve(-self._coupling.on_inner(u), self.rtol).x
+        force = self._coupling.on_surface(u, inner)
         return force if self.adjoint is None else self.adjoint.completed(force, u)
+
+    @cached_property
+    def _coupling(self) -> Coupling:
+        return coupling(self.system)
 
     @cached_property
     def pad_solver(self) -> Solver:
@@ -117,10 +105,8 @@ class CondensedOperator(_WithCompliance):
     @property
     def n_bytes(self) -> int:
         """Bytes that a call with one iteration reads."""
-        s = self.system
-        blocks = (s.surface, s.surface_to_inner, s.inner_to_surface)
         adjoint = 0 if self.adjoint is None else self.adjoint.n_bytes
-        return int(sum(map(matrix_bytes, blocks)) + self.inner_solver.n_bytes + adjoint)
+        return self._coupling.n_bytes + self.inner_solver.n_bytes + adjoint
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,15 +9,16 @@ from numba import njit
 
 @njit(cache=True, nogil=True, fastmath=False)
 def apply_stencil(types: Any, neighbours: Any, table: Any, u: Any, f: Any) -> None:
-    """f = K u for surface nodes that are coupled to their eight neighbours only.
+    """f = K u for nodes that are coupled to a few neighbours each.
 
-    `types` (c,) selects the blocks of `table` (t, 3, 3, 9) (row, column, neighbour). `neighbours`
-    (c, 9) are node numbers, with c for an absent one. The last row of `u` (c + 1, 3) is zero.
+    `types` (c,) selects the blocks of `table` (t, 3, 3, k) (row, column, neighbour). `neighbours`
+    (c, k) are rows of `u` (m, 3); for one that is absent, a row of zeros.
     """
+    count = neighbours.shape[1]
     for node in range(len(types)):
         blocks = table[types[node]]
         a = b = c = 0.0
-        for slot in range(9):
+        for slot in range(count):
             other = neighbours[node, slot]
             x, y, z = u[other, 0], u[other, 1], u[other, 2]
             a += blocks[0, 0, slot] * x + blocks[0, 1, slot] * y + blocks[0, 2, slot] * z

@@ -20,6 +20,7 @@ from ifem_export.operators.condensed_operators import (
 )
 from ifem_export.operators.convolved_operator import ConvolvedOperator, missing_resultant
 from ifem_export.operators.crowned_system import CrownedSystem, pad_system
+from ifem_export.operators.layer_coupling import AssembledCoupling, LayerCoupling, coupling
 from ifem_export.operators.layered_operator import (
     LayeredOperator,
     inner_compliance,
@@ -220,6 +221,22 @@ def test_the_missing_resultant_is_that_of_the_exact_operator() -> None:
     assert (rough.n_bytes, mended.n_bytes) == (blocks, blocks + 8 * 9 * count)
 
 
+@pytest.mark.parametrize("layers", [2, 3, 5])
+def test_forces_between_surface_and_inner_nodes_need_no_matrix(layers: int) -> None:
+    """Against the blocks of the assembled matrix, on a pad with a notch."""
+    mesh = flat(layers=layers)
+    system = PadSystem(mesh, element(mesh))
+    quick, assembled = coupling(system), AssembledCoupling(system)
+    assert isinstance(quick, LayerCoupling)
+    rng = np.random.default_rng(layers)
+    for _ in range(3):
+        u = rng.normal(size=(system.columns, 3))
+        inner = rng.normal(size=3 * (layers - 1) * system.columns)
+        np.testing.assert_allclose(quick.on_inner(u), assembled.on_inner(u), atol=1e-13)
+        found, expected = (c.on_surface(u, inner) for c in (quick, assembled))
+        np.testing.assert_allclose(found, expected, atol=1e-13)
+
+
 def matrix_bytes(*matrices) -> int:
     return sum(m.data.nbytes + m.indices.nbytes + m.indptr.nbytes for m in matrices)
 
@@ -227,13 +244,20 @@ def matrix_bytes(*matrices) -> int:
 def test_memory_is_that_of_the_arrays_which_a_call_reads() -> None:
     mesh = flat()
     system = PadSystem(mesh, element(mesh))
-    parts = (system.surface, system.inner, system.surface_to_inner, system.inner_to_surface)
+    count, masks = system.columns, system.mesh.numbering.masks
+    on_surface, below = masks[-count:], masks[-2 * count : -count]
+    coupled = 8 * (2 * count + 27 * count)
+    coupled += 8 * 81 * (2 * len(np.unique(on_surface)) + len(np.unique(below)))
     factor, gradients = inner_solver(system, "direct"), inner_solver(system, "pcg")
     assert isinstance(factor, SparseFactor)
     exact = CondensedOperator(system, "factor", factor, 1e-10)
-    assert exact.n_bytes == matrix_bytes(*parts) + 12 * factor.factor.nnz
+    assert exact.n_bytes == coupled + matrix_bytes(system.inner) + 12 * factor.factor.nnz
     quick = CondensedOperator(system, "pcg", gradients, 1e-10)
-    assert quick.n_bytes == matrix_bytes(*parts) + system.inner_preconditioner.blocks.nbytes
+    gradients_read = matrix_bytes(system.inner) + system.inner_preconditioner.blocks.nbytes
+    assert quick.n_bytes == coupled + gradients_read
+    cut = PadSystem(flat("volume_fraction"), element(flat("volume_fraction")))
+    parts = (cut.surface, cut.surface_to_inner, cut.inner_to_surface)
+    assert coupling(cut).n_bytes == matrix_bytes(*parts)
     assert DenseOperator(system).n_bytes == 4 * (3 * system.columns) ** 2
     for weighting in ("cell_centre", "volume_fraction"):
         thin = flat(weighting, 1)
