@@ -197,8 +197,10 @@ def shifted(image: Picture, rng: Rng) -> Picture:
     """Shifted as by a knock of the camera: by one to 80 px, of which a pitch is 24."""
     size, angle = np.exp(rng.uniform(0, np.log(80))), rng.uniform(0, 2 * np.pi)
     across, down = np.rint(size * np.array([np.cos(angle), np.sin(angle)])).astype(int)
-    y, x = (np.clip(np.arange(n) - by, 0, n - 1) for n, by in zip(image.shape, (down, across)))
-    return image[y[:, None], x]
+    height, width = image.shape[:2]
+    rows = np.clip(np.arange(height) - down, 0, height - 1)
+    columns = np.clip(np.arange(width) - across, 0, width - 1)
+    return image[rows[:, None], columns]
 
 
 def wrong_dots(image: Picture, rng: Rng) -> Picture:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 from pressed_samples import calibration, lit_bundle, reference
 
 from gelslim_force.joint.checked_indenter import CheckedIndenter
 from gelslim_force.joint.settings import WITNESS, JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
-from gelslim_force.sensor import indenter_source
+from gelslim_force.sensor import indenter_source, open_sensor
 from gelslim_force.settings import PipelineSettings
 
 
@@ -38,3 +39,11 @@ def checked(name: str) -> ForcePipeline:
     """A named indenter that light and markers confirm."""
     named = opened(name).normal
     return opened("none").with_normal(CheckedIndenter(named, witness(WITNESS)))  # type: ignore[arg-type]
+
+
+@cache
+def grey_pipeline() -> ForcePipeline:
+    """Of the same sensor with a mono camera: forces of any object from the markers alone."""
+    bundle = replace(lit_bundle(), camera={**lit_bundle().camera, "picture": "mono"})
+    rest = np.rint(reference().image.mean(axis=2)).astype(np.uint8)
+    return open_sensor(bundle, reference=rest)
