@@ -192,7 +192,8 @@ class ForcePipeline:
 
         Raises:
             ValueError: `normal_mm` or `normal_sigma_mm` has another shape or is not finite, a
-                deviation is negative, or `stamp_s` is no number of seconds since 1970.
+                deviation is negative, `time_s` is no finite number, or `stamp_s` is no number of
+                seconds since 1970.
         """
         clock = FrameClock()
         times = FrameTimes.of(frame, time_s, stamp_s)

@@ -51,6 +51,7 @@ bundle's own operator."""
 MEANS = ("error_px", "misplaced")
 """What a tracker tells beside its time."""
 WARM_UP = 2 * CYCLE
+LEAST_CYCLES = 3
 SOAK_REPORTS = 10
 Clock = Callable[[], float]
 Chain = Callable[[int], dict[str, float]]
@@ -122,11 +123,15 @@ def all_chains(
     """The chains compared, by name."""
     known = [share * rig.press.nodes_mm[:, 2] for share in shares(CYCLE)]
     loose = PipelineSettings(budget=Budget(error=LOOSE))
-    # The rig draws grey values in proportion to the light.
-    for suffix, chosen in (("", JointSettings()), (", on nodes", ON_NODES)):
+    for suffix, chosen, gel in (
+        ("", JointSettings(), "linear"),
+        (", on nodes", ON_NODES, "linear"),
+        (", gel auto", JointSettings(), "auto"),
+    ):
+        # The rig draws grey values in proportion to the light.
         drawn = replace(chosen, gamma=1.0)
-        anything = unknown_shape(rig.bundle, calibration, frames[0], settings=drawn)
-        chain = ForcePipeline(rig.bundle, calibration, None, anything)
+        anything = unknown_shape(rig.bundle, calibration, frames[0], gel=gel, settings=drawn)
+        chain = ForcePipeline(rig.bundle, calibration, PipelineSettings(gel=gel), anything)
         yield f"any object{suffix}", pipeline_chain(chain, frames, clock)
     for suffix, settings in (("", None), (f", {LOOSE:.0%}", loose)):
 
@@ -215,10 +220,17 @@ def paper_chain(
 
 def summary(times: list[dict[str, float]]) -> dict[str, Any]:
     """Median, 95th and 99th percentile per stage in ms, and means; stages that a frame skips count
-    0."""
+    0.
+
+    `own` is of the frames of the cycle, of which each has its median over the cycles: what the work
+    of a frame itself differs, without what else the machine does. It needs three cycles.
+    """
     names = list(dict.fromkeys(name for t in times for name in t))
     table = {name: np.array([t.get(name, 0.0) for t in times]) for name in names}
     means = {name: float(np.mean(table.pop(name))) for name in MEANS if name in table}
+    cycles = len(times) // CYCLE
+    if cycles >= LEAST_CYCLES:
+        table["own"] = np.median(table["total"][: cycles * CYCLE].reshape(cycles, CYCLE), axis=0)
     return means | {
         name: dict(zip(("median", "p95", "p99"), map(float, np.percentile(v, (50, 95, 99))),
                        strict=True))
@@ -232,7 +244,7 @@ def line(row: dict[str, Any]) -> str:
     notes = [
         f"{name} {v['median']:.2f}"
         for name, v in row.items()
-        if isinstance(v, dict) and name != "total"
+        if isinstance(v, dict) and name not in ("total", "own")
     ]
     if "error_px" in row:
         notes = [f"error {row['error_px']:.3f} px, misplaced {row['misplaced']:.2%}"]

@@ -7,6 +7,7 @@ from typing import Any
 SHORT = {
     "any object": "any object, from light and markers",
     "any object, on nodes": "the same with `--no-finer-pressure`",
+    "any object, gel auto": "the same with `--gel auto`, a contact of a quarter of the thickness",
     "depth given, 25%": "depth given",
     "tangential, 25%": "tangential forces alone (`--indenter none`)",
     "sphere seen, 25%": "only the ball's size given, contact found in the picture",
@@ -36,6 +37,11 @@ def full_latency(data: dict[str, Any]) -> str:
         "dot, compensates with the printed formula, makes Delaunay triangles in each frame and "
         "has a stiffness of one layer. It uses our detector."
     ]
+    if any("own" in row for row in data["chains"]):
+        parts[0] += (
+            " A frame's own work is its median over the pushes, which leaves out what else the "
+            "machine does."
+        )
     for count in dict.fromkeys(row["markers"] for row in data["chains"]):
         rows = [row for row in data["chains"] if row["markers"] == count]
         lines = [
@@ -51,6 +57,9 @@ def full_latency(data: dict[str, Any]) -> str:
             lines.append(f"| {STAGES.get(name, '**whole chain**')} | " + " | ".join(cells) + " |")
         for tail, label in (("p95", "whole chain, 95 %"), ("p99", "whole chain, 99 %")):
             lines.append(f"| {label} | " + " | ".join(ms(r["total"][tail]) for r in rows) + " |")
+        if any("own" in r for r in rows):
+            cells = [ms(r["own"]["p99"]) if "own" in r else "" for r in rows]
+            lines.append(f"| a frame's own work, 99 % | {' | '.join(cells)} |")
         parts.append("\n".join(lines))
     parts.append(tracker_table(data["trackers"]))
     first = data["first_frame"]
@@ -115,7 +124,9 @@ def short_latency(data: dict[str, Any]) -> str:
     ]
     totals = {(row["chain"], row["markers"]): row["total"] for row in data["chains"]}
     for chain, name in SHORT.items():
-        of = [totals[chain, count] for count in counts]
+        of = [totals[chain, count] for count in counts if (chain, count) in totals]
+        if not of:
+            continue
         cells = [f"{ms(t['median'])} ({ms(t['p95'])})" for t in of]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)

@@ -7,6 +7,7 @@ from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Self
 
 import numpy as np
@@ -63,7 +64,8 @@ class FrameTimes:
         sensor_s: Time by the clock of the camera or its driver.
 
     Raises:
-        ValueError: `stamp_s` is not finite, negative, or in another unit than seconds.
+        ValueError: A time is no finite number, or `stamp_s` is negative or in another unit than
+            seconds.
     """
 
     time_s: float | None = None
@@ -74,6 +76,8 @@ class FrameTimes:
         problem = "" if self.stamp_s is None else stamp_problem(self.stamp_s)
         if problem:
             raise ValueError(problem)
+        if self.time_s is not None and not _is_finite(self.time_s):
+            raise ValueError(f"time_s = {self.time_s!r}: must be a finite number of seconds")
 
     @classmethod
     def of(cls, frame: object, time_s: float | None, stamp_s: float | None) -> FrameTimes:
@@ -89,12 +93,16 @@ class FrameTimes:
 
 def stamp_problem(stamp_s: float) -> str:
     """Return why a number cannot be seconds since 1970; empty if it can."""
-    if math.isfinite(stamp_s) and 0 <= stamp_s <= _LATEST_STAMP_S:
+    limits = f"must be seconds since 1970 in 0 ... {_LATEST_STAMP_S:g}"
+    if not isinstance(stamp_s, Real):
+        return f"stamp_s = {stamp_s!r}: {limits}, as time.time() and datetime.timestamp() give them"
+    if _is_finite(stamp_s) and 0 <= stamp_s <= _LATEST_STAMP_S:
         return ""
-    return (
-        f"stamp_s = {stamp_s:g}: must be seconds since 1970 in 0 ... {_LATEST_STAMP_S:g}; divide "
-        "nanoseconds by 1e9"
-    )
+    return f"stamp_s = {float(stamp_s):g}: {limits}; divide nanoseconds by 1e9"
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, Real) and math.isfinite(value)
 
 
 class FrameSource(AbstractContextManager[Any]):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pytest
 from sensor_samples import frame, sensor_bundle, stream
@@ -105,9 +107,12 @@ def test_the_callers_stamp_takes_the_place_of_the_frames(place) -> None:
     ]
     assert sensor.process(np.zeros((3, 3), np.uint8)).stamp_s is None
     assert sensor.unreadable("gone", stamp_s=1.8e9).stamp_s == 1.8e9
-    for wrong in (1.8e18, -1.0, np.nan):
+    for wrong in (1.8e18, -1.0, np.nan, "now", datetime.now(UTC)):
         with pytest.raises(ValueError, match="since 1970"):
-            sensor.process(torn, stamp_s=wrong)
+            sensor.process(torn, stamp_s=wrong)  # type: ignore[arg-type]
+    for wrong in (np.inf, np.nan, "3"):
+        with pytest.raises(ValueError, match="time_s"):
+            sensor.process(torn, time_s=wrong)  # type: ignore[arg-type]
     assert sensor.process(torn).index == 4
 
 
