@@ -232,7 +232,9 @@ class ForcePipeline:
         if untouched(reading, self._check.unseen.thickness_mm):
             found["wrench"] = with_untouched(found["wrench"])
         if self.gel is not None:
-            found["wrench"] = self.gel.added(found["wrench"], field.displacement_mm, reading)
+            found["wrench"] = self.gel.added(
+                found["wrench"], field.displacement_mm, reading, field.by_linear_law
+            )
         if self._motion.moved(motion):
             problems = (*problems, *frame_problems.misfit_problem(field.misfit))
         known = reading is not None and reading.known
@@ -249,7 +251,7 @@ class ForcePipeline:
             extra={
                 **seen,
                 **field.summary(),
-                "gel": self.gel_law.at(field.displacement_mm),
+                "gel": self.gel_law.at(field.displacement_mm, field.by_linear_law),
                 **self._drift.findings(drift),
             },
             **found,
@@ -317,10 +319,15 @@ class ForcePipeline:
     ) -> dict[str, Any]:
         """Force field and wrench for a motion (n, 3) of the markers. Raises IfemError."""
         if reading is not None and reading.known and reading.forces is not None:
-            force, moved = reading.forces.force_n, reading.forces.displacement_mm
+            forces = reading.forces
             covariance = self._covariance.of_forces(reading, noise, drift)
-            wrench = self._wrench.wrench(force, covariance)
-            field = self._forces.direct.field_of(force, moved, reading.touched)
+            wrench = self._wrench.wrench(forces.force_n, covariance)
+            field = self._forces.direct.field_of(
+                forces.force_n,
+                forces.displacement_mm,
+                reading.touched,
+                by_linear_law=forces.by_linear_law,
+            )
             return {"field": field, "wrench": wrench}
         noise_mm = noise * self._motion.view.usual_mm_per_px
         filled = self._check.unseen.filled(motion, tracked, noise_mm)

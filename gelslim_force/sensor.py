@@ -23,8 +23,9 @@ from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.checked_indenter import CheckedIndenter
 from gelslim_force.joint.light.calibration import LightCalibration
+from gelslim_force.joint.sensor_source import layer_stiffness_n_mm, unknown_shape
 from gelslim_force.joint.settings import ON_NODES, WITNESS, JointSettings
-from gelslim_force.joint.unknown_shape import UnknownShape, layer_stiffness_n_mm, unknown_shape
+from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.presses.gel_calibration import GelCalibration
 from gelslim_force.settings import PipelineSettings

@@ -55,7 +55,7 @@ class PipelineSettings:
     budget: Budget | None = None
     compensation: Compensation = "exact"
     interpolation: Interpolation = "sparse"
-    gel: Gel = "linear"
+    gel: Gel = "auto"
     force: ForceSettings = field(default_factory=ForceSettings)
     noise_px: float | None = None
     unknown_normal_mm: float = 0.3

@@ -37,8 +37,8 @@ from gelslim_core.budget.budget import Budget
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import NormalSource
+from gelslim_force.joint.sensor_source import unknown_shape
 from gelslim_force.joint.settings import ON_NODES, JointSettings
-from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import indenter_source
 from gelslim_force.settings import PipelineSettings

@@ -6,9 +6,10 @@
 Writes docs/data/mitsuba_forces.json and docs/images/mitsuba_forces.png. A finger `gelslim2` that is
 built a little beside its design is photographed at rest, under contacts of known force and under a
 ball for the calibration of its light. Then the commands run that a user would type: `gelslim
-bundle`, `calibrate`, `calibrate-light` and `force`, with nothing said of the object. Pictures are
-kept in a folder, so that a run that was stopped goes on where it ended. Light and pictures are told
-in rigs/mitsuba_sensor.py, contacts in rigs/outside_contacts.py.
+bundle`, `calibrate`, `calibrate-light` and `force`, with nothing said of the object. Linear gels
+are told by `--gel linear`. Pictures are kept in a folder, so that a run that was stopped goes on
+where it ended. Light and pictures are told in rigs/mitsuba_sensor.py, contacts of linear gels in
+rigs/outside_contacts.py, those at large strain in rigs/outside_shapes.py.
 """
 
 from __future__ import annotations
@@ -30,13 +31,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.bench_data import DOCS, ROOT, write_data, write_whole
-from bench.page.mitsuba_scores import CALIBRATED, GEL_KNOWN, TRACED, drawn, table
+from bench.page.mitsuba_scores import CALIBRATED, GEL_KNOWN, LINEAR, TRACED, drawn, table
 from bench.rigs.machine import installed, machine
 
 Array = NDArray[np.float64]
 DESIGN = ROOT / "designs" / "gelslim2.yaml"
 KEPT = Path("out") / "mitsuba_forces"
-CONTACTS, PRESSES, RAYS = 16, 8, 8_000_000
+CONTACTS, SHAPES, PRESSES, RAYS = 16, 7, 8, 8_000_000
+FRAMES = {"linear": "frames", "neo_hookean": "deep"}
+"""Folders of the pictures by the law of the gel."""
 COLUMNS = ("fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm")
 
 
@@ -46,6 +49,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--contacts", type=int, default=CONTACTS, help="half of them balls")
+    parser.add_argument("--shapes", type=int, default=SHAPES, help="rigid ones at large strain")
     parser.add_argument("--rays", type=int, default=RAYS, help="of each colour that reach the gel")
     parser.add_argument("--kept", type=Path, default=KEPT, help="folder for pictures and runs")
     parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
@@ -53,7 +57,7 @@ def main() -> None:
     options = parser.parse_args()
     stored = options.docs / "data" / "mitsuba_forces.json"
     if not options.figure:
-        trial = Trial(options.kept, options.contacts, options.rays)
+        trial = Trial(options.kept, options.contacts, options.shapes, options.rays)
         data = {**machine(0), "mitsuba": installed("mitsuba"), "rays": options.rays}
         write_data("mitsuba_forces", {**data, **trial.scored()}, options.docs)
     record = json.loads(stored.read_text("utf-8"))
@@ -67,13 +71,15 @@ class Trial:
 
     Attributes:
         kept: The folder.
-        contacts: Number of contacts; every other one is a ball.
+        contacts: Number of contacts of linear gels; every other one is a ball.
+        shapes: Number of rigid shapes at large strain.
         rays: Rays of each source that reach the gel.
         presses: Pictures of a ball for the calibration of the light; 0 to leave that out.
     """
 
     kept: Path
     contacts: int
+    shapes: int
     rays: int
     presses: int = PRESSES
 
@@ -94,6 +100,13 @@ class Trial:
         return OutsidePads(load_bundle(self.bundle))
 
     @cached_property
+    def deep(self) -> Any:
+        """Contacts of rigid shapes at large strain."""
+        from bench.rigs.outside_shapes import OutsideShapes
+
+        return OutsideShapes(self.pads, self.kept / "contacts")
+
+    @cached_property
     def sensor(self) -> Any:
         """The built finger."""
         from bench.rigs.mitsuba_sensor import MitsubaSensor
@@ -109,7 +122,7 @@ class Trial:
 
     def seen(self, name: str, motion: Any) -> Array:
         """Light in the pixels, drawn once."""
-        path = self.kept / "light" / f"{name.replace(' ', '_')}.npy"
+        path = self.kept / "light" / f"{name.replace(' ', '_').replace(':', '')}.npy"
         if not path.exists():
             print(name, flush=True)
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -124,10 +137,11 @@ class Trial:
         for number in range(self.contacts):
             kind = self.pads.ball if number % 2 else self.pads.press
             yield kind(number // 2)
+        yield from map(self.deep.shape, range(self.shapes))
 
     def draw(self) -> list[Any]:
         """Write the pictures: rest, presses of a ball, and frames with rest between contacts."""
-        for name in ("frames", "presses"):
+        for name in (*FRAMES.values(), "presses"):
             shutil.rmtree(self.kept / name, ignore_errors=True)
         rest = self.seen("rest", None)
         camera = self.sensor.response(rest)
@@ -138,7 +152,7 @@ class Trial:
             for k, shown in enumerate((rest, light)):
                 frame = 2 * number + k
                 picture = camera.picture(shown, 1000 + frame)
-                write_picture(self.kept / "frames" / f"{frame:03}.png", picture)
+                write_picture(self.kept / FRAMES[contact.law] / f"{frame:03}.png", picture)
         for number in range(self.presses):
             press = self.pads.calibration_press(number)
             light = self.seen(press.name, press.motion)
@@ -147,28 +161,42 @@ class Trial:
         return contacts
 
     def scored(self) -> dict[str, Any]:
-        """Forces of every contact beside the truth, by what is told of the light."""
+        """Forces of every contact beside the truth, by what is told of light and gel."""
         contacts = self.draw()
         bundle, calibration = str(self.bundle), str(self.kept / "calibration.json")
         gelslim("calibrate", bundle, str(self.kept / "rest.png"), "-o", calibration)
         ways: dict[str, tuple[str, ...]] = {TRACED: ()}
         if self.presses:
             ways[CALIBRATED] = ("--light-calibration", str(self._calibrated_light(calibration)))
-        found = {}
+        found, at_rest = {}, {}
         for name, told in ways.items():
-            run = self.kept / name.replace(" ", "_")
-            gelslim(
-                "force", bundle, str(self.kept / "frames"), "-c", calibration, *told,
-                "-o", str(run), "--force", "--pictures", "0",
-            )  # fmt: skip
-            rows = read_rows(run / "wrenches.csv")
-            found[name] = {"at_rest": _at_rest(rows[0::2]), "rows": [_row(r) for r in rows[1::2]]}
+            plain, rest = self._run(name, "linear", "-c", calibration, *told, "--gel", "linear")
+            deep, deep_rest = self._run(name, "neo_hookean", "-c", calibration, *told)
+            found[name], at_rest[name] = {"rows": plain + deep}, _at_rest(rest + deep_rest)
+        if self.shapes:
+            deep, _ = self._run(LINEAR, "neo_hookean", "-c", calibration, "--gel", "linear")
+            found[LINEAR] = {"rows": [None] * self.contacts + deep}
         found[GEL_KNOWN] = {"rows": self._by_known_gels(contacts)}
         truth = [
             {"name": c.name, "wrench": _short(c.wrench), "centre_mm": _short(c.centre_mm)}
             for c in contacts
         ]
-        return {"truth": truth, "ways": found}
+        return {"truth": truth, "at_rest": at_rest, "ways": found}
+
+    def _run(
+        self, way: str, law: str, *told: str
+    ) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+        """Rows of the contacts of one law of the gel by `gelslim force`, and lines at rest."""
+        frames = self.kept / FRAMES[law]
+        if not frames.exists():
+            return [], []
+        run = self.kept / f"{way}, {law}".replace(", ", "_").replace(" ", "_")
+        gelslim(
+            "force", str(self.bundle), str(frames), *told,
+            "-o", str(run), "--force", "--pictures", "0",
+        )  # fmt: skip
+        lines = read_rows(run / "wrenches.csv")
+        return [_row(line) for line in lines[1::2]], lines[0::2]
 
     def _by_known_gels(self, contacts: list[Any]) -> list[dict[str, Any]]:
         """Forces by pipelines that have the gel of each contact, without tolerances.
@@ -178,23 +206,30 @@ class Trial:
         from dataclasses import replace
 
         from gelslim_force import open_sensor, read_reference
+        from gelslim_force.settings import PipelineSettings
 
         designed = self.pads.bundle
         thickness = designed.mesh.layers * designed.mesh.cell_size_mm[2]
         rest = read_reference(self.kept / "rest.png")
-        opened: dict[tuple[float, float], Any] = {}
+        opened: dict[tuple[float, float, str], Any] = {}
         rows = []
-        for number in range(len(contacts)):
-            gel = self.pads.gel(number // 2)
-            key = gel.thickness_mm, gel.poissons_ratio
+        for number, contact in enumerate(contacts):
+            gel = self.pads.gel(contact.gel)
+            key = gel.thickness_mm, gel.poissons_ratio, contact.law
             if key not in opened:
                 built = designed.with_gel(replace(designed.material, poissons_ratio=key[1]))
                 mesh = designed.mesh.stretched(key[0] / thickness)
                 known = replace(built, mesh=mesh, tolerances={})
-                opened[key] = open_sensor(known, reference=rest, indenter="unknown")
+                law = "linear" if contact.law == "linear" else "auto"
+                opened[key] = open_sensor(
+                    known,
+                    reference=rest,
+                    indenter="unknown",
+                    settings=PipelineSettings(gel=law),  # type: ignore[arg-type]
+                )
             opened[key].process(rest)
-            frame = read_reference(self.kept / "frames" / f"{2 * number + 1:03}.png")
-            result = opened[key].process(frame)
+            frames = self.kept / FRAMES[contact.law]
+            result = opened[key].process(read_reference(frames / f"{2 * number + 1:03}.png"))
             wrench = result.wrench
             rows.append(
                 {

@@ -40,8 +40,9 @@ from pressed_samples import (  # noqa: E402
 
 from gelslim_force.contact.indenter import Sphere  # noqa: E402
 from gelslim_force.forces.frame_result import FrameResult  # noqa: E402
+from gelslim_force.joint.sensor_source import unknown_shape  # noqa: E402
 from gelslim_force.joint.settings import JointSettings  # noqa: E402
-from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape  # noqa: E402
+from gelslim_force.joint.unknown_shape import UnknownShape  # noqa: E402
 from gelslim_force.pipeline import ForcePipeline  # noqa: E402
 from gelslim_force.sensor import indenter_source  # noqa: E402
 from gelslim_force.settings import PipelineSettings  # noqa: E402

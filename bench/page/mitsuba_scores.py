@@ -16,6 +16,8 @@ Record = Mapping[str, Any]
 TRACED, CALIBRATED = ("light as traced", "light calibrated")
 """What is told of the light beside the camera's calibration."""
 GEL_KNOWN = "gel known, light as traced"
+LINEAR = "light as traced, `--gel linear`"
+"""Of contacts at large strain only."""
 COLOURS = {TRACED: "#c4580a", CALIBRATED: "#1f4e8c", GEL_KNOWN: "#2d8a57"}
 LABELS = ("F_x", "F_y", "F_z")
 _NORMAL_95 = 1.96
@@ -44,7 +46,7 @@ class Scores:
         pairs = [
             (true, row)
             for true, row in zip(record["truth"], rows, strict=True)
-            if true["name"].startswith(kind)
+            if row is not None and true["name"].startswith(kind)
         ]
         found, sigma = (
             np.array([row[key] for _, row in pairs], dtype=float) for key in ("wrench", "sigma")
@@ -80,7 +82,8 @@ class Scores:
 
 def table(record: Record) -> str:
     """Errors and scores as a Markdown table."""
-    kinds = {"given tractions": "press", "balls": "ball", "**all**": ""}
+    linear = {"given tractions": "press", "balls": "ball"}
+    kinds = {**linear, "shapes at large strain": "shape", "**all**": ""}
     lines = [
         f"The finger `gelslim2` with {record['rays'] / 1e6:.3g} million rays of each colour on its "
         "gel; three numbers are those of F_x, F_y and F_z.",
@@ -92,7 +95,9 @@ def table(record: Record) -> str:
     ]
     for way in record["ways"]:
         for name, kind in kinds.items():
-            lines.append(_line(f"{way}, {name}", Scores.of(record, way, kind)))
+            some = Scores.of(record, way, kind)
+            if len(some.truth) and (way != LINEAR or kind):
+                lines.append(_line(f"{way}, {name}", some))
     return "\n".join(lines)
 
 

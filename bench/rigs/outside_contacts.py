@@ -32,7 +32,7 @@ Motion = Callable[[Array], Array]
 GELS = ((-1, 1), (1, 1), (1, -1), (-1, -1))
 """Thickness and Poisson's ratio of the built gels, in standard deviations."""
 CALIBRATION_BALL_MM = 8.0
-_RADII_MM, _LEAST_N = (4.0, 5.0, 6.35, 8.0), 0.2
+_RADII_MM, LEAST_N = (4.0, 5.0, 6.35, 8.0), 0.2
 _SIZES, _PLACES_MM = (0.4, 1.3), 5.0
 
 
@@ -45,12 +45,16 @@ class OutsideContact:
         motion: Places (n, 2) at rest to motions (n, 3) of the surface in mm.
         wrench: (6,) force in N and torque about the origin in N mm, on the gel.
         centre_mm: (2,) centre of pressure.
+        gel: Number of its gel, see `OutsidePads.gel`.
+        law: That of the gel: `linear` or `neo_hookean`.
     """
 
     name: str
     motion: Motion
     wrench: Array
     centre_mm: Array
+    gel: int
+    law: str = "linear"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +71,13 @@ class OutsidePads:
             size = np.exp(rng.uniform(*np.log(_SIZES)))
             points = gel.points_mm
             force = tractions(points, rng) * gel.cell_mm2 * size
-            if -force[:, 2].sum() >= _LEAST_N:
+            if -force[:, 2].sum() >= LEAST_N:
                 return OutsideContact(
                     f"press {seed}",
                     gel.motion(force),
-                    _wrench(points, force),
-                    _centre(points, force),
+                    contact_wrench(points, force),
+                    pressure_centre(points, force),
+                    seed,
                 )
         raise AssertionError("no contact of sufficient force in a hundred draws")
 
@@ -82,7 +87,7 @@ class OutsidePads:
         rng = np.random.default_rng([62, seed])
         radius = float(rng.choice(_RADII_MM))
         disc = pressed_disc(radius, gel.thickness_mm, gel.poissons_ratio, bool(rng.random() < 0.5))
-        least = np.interp(_LEAST_N / gel.young_mpa, disc.force_n, disc.contact_mm)
+        least = np.interp(LEAST_N / gel.young_mpa, disc.force_n, disc.contact_mm)
         largest = min(2.8, float(np.sqrt(2 * radius * 0.3 * gel.thickness_mm)))
         contact, place = rng.uniform(max(1.2, least), largest), rng.uniform(-6, 6, 2)
         push = gel.young_mpa * float(np.interp(contact, disc.contact_mm, disc.force_n))
@@ -103,7 +108,7 @@ class OutsidePads:
 
         force = np.array([*shear, -push])
         wrench = np.concatenate([force, np.cross([*place, 0.0], force)])
-        return OutsideContact(f"ball {seed}", motion, wrench, place)
+        return OutsideContact(f"ball {seed}", motion, wrench, place, seed)
 
     def calibration_press(self, number: int) -> OutsideContact:
         """A ball of `CALIBRATION_BALL_MM` pressed straight down in a quarter of the gel.
@@ -125,7 +130,7 @@ class OutsidePads:
         place = quarter * rng.uniform(1.0, 8.0, 2)
         wrench = np.array([0, 0, -push, -push * place[1], push * place[0], 0])
         motion = _round_motion(place, disc.r_mm, outward, height)
-        return OutsideContact(f"calibration {number}", motion, wrench, place)
+        return OutsideContact(f"calibration {number}", motion, wrench, place, 0)
 
     def gel(self, seed: int) -> BuiltGel:
         """The gel of a contact; four thicknesses and ratios take turns, the modulus is drawn."""
@@ -198,11 +203,11 @@ def _round_motion(place: Array, r_mm: Array, outward_mm: Array, height_mm: Array
     return motion
 
 
-def _wrench(points_mm: Array, force_n: Array) -> Array:
+def contact_wrench(points_mm: Array, force_n: Array) -> Array:
     rest = points_mm * [1.0, 1.0, 0.0]
     return np.concatenate([force_n.sum(axis=0), np.cross(rest, force_n).sum(axis=0)])
 
 
-def _centre(points_mm: Array, force_n: Array) -> Array:
+def pressure_centre(points_mm: Array, force_n: Array) -> Array:
     push = force_n[:, 2]
     return np.asarray((points_mm[:, :2] * push[:, None]).sum(axis=0) / push.sum())

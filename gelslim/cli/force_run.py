@@ -229,7 +229,13 @@ Compensation = Annotated[
     str, typer.Option(help="Correction for projection: exact, arctan, printed or none.")
 ]
 Interpolation = Annotated[str, typer.Option(help="From markers to nodes: sparse or thin_plate.")]
-GelLaw = Annotated[str, typer.Option(help="Law of the gel: linear, neo_hookean or auto.")]
+GelLaw = Annotated[
+    str,
+    typer.Option(
+        help="Law of the gel: auto takes the neo-Hookean one for contacts deeper than a tenth of the "
+        "thickness; linear or neo_hookean at any depth."
+    ),
+]
 FinerPressure = Annotated[
     bool,
     typer.Option(

@@ -35,6 +35,8 @@ class FoundForces:
         unexplained: Share of the change of the light that the forces do not explain.
         by_gel: (p, 6) change of force and torque by ln thickness and by Poisson's ratio of the gel;
             None where it is that of forces that follow from the motion.
+        by_linear_law: Whether they are those of a linear gel because the law at large strain
+            explains no motion.
     """
 
     force_n: Array
@@ -44,6 +46,7 @@ class FoundForces:
     gain: float
     unexplained: float
     by_gel: Array | None = None
+    by_linear_law: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from gelslim_core.immutable import frozen
+from gelslim_force.forces.finite_strain import DepthLaw, LawForce
 from gelslim_force.forces.frame_result import ForceField
 from gelslim_force.forces.low_pass import (
     ForceNoise,
@@ -161,15 +162,17 @@ class ForceEstimator:
         u = displacement_mm if normal_known else displacement_mm * [1.0, 1.0, 0.0]
         if not normal_known:
             u[:, 2] = 0.0
-        misfit, smoothed = 0.0, None
+        misfit, smoothed, given = 0.0, None, self._by_law(u)
         if self._masked(touched if normal_known else None):
             assert touched is not None
-            force, misfit = self._fitted(u, touched, start_n)
+            moved = u if given is None else self.operator.displacement(given.force_n)
+            force, misfit = self._fitted(moved, touched, start_n)
         else:
             noise = MotionNoise(noise_px, normal_noise_mm(self.curvature, u[:, 2]))
-            smoothed = self.low_pass.applied((self.law or self.operator).force(u), noise)
+            whole = self.operator.force(u) if given is None else given.force_n
+            smoothed = self.low_pass.applied(whole, noise)
             force = smoothed.force_n
-            if self.adjoint is not None and self.law is None:
+            if self.adjoint is not None and given is None:
                 force = self.adjoint.completed(force, u)
         if touched is None:
             assert smoothed is not None
@@ -177,7 +180,14 @@ class ForceEstimator:
         if not normal_known:
             force[:, 2] = np.nan
         width = None if smoothed is None else smoothed.width_mm
-        return self.field_of(force, displacement_mm, touched, misfit, width)
+        by_linear_law = given is not None and given.by_linear_law
+        return self.field_of(force, displacement_mm, touched, misfit, width, by_linear_law)
+
+    def _by_law(self, u: Array) -> LawForce | None:
+        """Forces of another law at a motion (c, 3); None without one. Raises as the law."""
+        if isinstance(self.law, DepthLaw):
+            return self.law.of(u)
+        return None if self.law is None else LawForce(self.law.force(u))
 
     def field_of(
         self,
@@ -186,6 +196,7 @@ class ForceEstimator:
         touched: Mask | None,
         misfit: float = 0.0,
         low_pass_mm: Array | None = None,
+        by_linear_law: bool = False,
     ) -> ForceField:
         """Field of forces (c, 3) at a motion (c, 3); without `touched` all that press touch."""
         contact = np.asarray(force_n[:, 2] < 0) if touched is None else touched
@@ -199,14 +210,13 @@ class ForceEstimator:
             slip_margin=self._slip_margin(force_n),
             misfit=misfit,
             low_pass_mm=low_pass_mm,
+            by_linear_law=by_linear_law,
         )
 
     def _masked(self, touched: Mask | None) -> bool:
         return touched is not None and self.settings.method in ("auto", "masked")
 
     def _fitted(self, u: Array, touched: Mask, start_n: Array | None) -> tuple[Array, float]:
-        if self.law is not None:
-            u = self.operator.displacement(self.law.force(u))
         fit = masked_force(
             self.operator,
             u,

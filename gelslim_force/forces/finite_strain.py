@@ -26,7 +26,7 @@ from scipy import sparse
 
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.elements.skin import Membrane
-from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
+from ifem_export.finite_strain.neo_hookean import FiniteStrainError, NeoHookeanPad
 from ifem_export.operators.pad_system import PadSystem, checked_field
 from ifem_export.operators.solver import ConvergenceError, Solver, inner_solver
 
@@ -163,6 +163,19 @@ class FiniteStrainForce:
 
 
 @dataclass(frozen=True, eq=False)
+class LawForce:
+    """What a law gives.
+
+    Attributes:
+        force_n: (c, 3) forces that hold the surface, in N.
+        by_linear_law: Whether they are those of a linear gel although the contact is deep.
+    """
+
+    force_n: Array
+    by_linear_law: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class DepthLaw:
     """The linear law for shallow contacts, and the neo-Hookean one from a depth on.
 
@@ -180,10 +193,21 @@ class DepthLaw:
     from_mm: float
 
     def force(self, displacement_mm: ArrayLike) -> Array:
-        """Forces that hold the surface in a motion (c, 3); raises as both laws."""
+        """Forces that hold the surface in a motion (c, 3); raises as the linear law."""
+        return self.of(displacement_mm).force_n
+
+    def of(self, displacement_mm: ArrayLike) -> LawForce:
+        """The same, with whether a deep contact has the forces of a linear gel.
+
+        It has where the motion is none that the gel can have: it inverts a cell of the mesh.
+        """
         motion = np.asarray(displacement_mm, dtype=float)
-        deep = -float(motion[:, 2].min(initial=0.0)) >= self.from_mm
-        return (self.strained if deep else self.linear).force(motion)
+        if -float(motion[:, 2].min(initial=0.0)) < self.from_mm:
+            return LawForce(self.linear.force(motion))
+        try:
+            return LawForce(self.strained.force(motion))
+        except (FiniteStrainError, ConvergenceError):
+            return LawForce(self.linear.force(motion), by_linear_law=True)
 
 
 def deep_mm(bundle: Bundle) -> float:

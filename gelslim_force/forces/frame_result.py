@@ -39,6 +39,8 @@ class ForceField(Immutable):
         misfit: Share of the motion that the masked forces do not explain; 0 for other methods.
         low_pass_mm: (2,) standard deviation of the low-pass, tangential and normal; None for
             masked forces.
+        by_linear_law: Whether a deep contact has the forces of a linear gel because the law at
+            large strain knows no such motion.
     """
 
     points_mm: Array
@@ -50,6 +52,7 @@ class ForceField(Immutable):
     slip_margin: float
     misfit: float = 0.0
     low_pass_mm: Array | None = None
+    by_linear_law: bool = False
 
     def to_record(self) -> dict[str, Any]:
         """The attributes as values that JSON holds; null where unknown."""
@@ -72,6 +75,7 @@ class ForceField(Immutable):
             slip_margin=read.real("slip_margin"),
             misfit=read.real("misfit"),
             low_pass_mm=read.known_reals("low_pass_mm", 2),
+            by_linear_law="by_linear_law" in record and bool(read.truths("by_linear_law")),
         )
 
     def summary(self) -> dict[str, Any]:

@@ -53,8 +53,12 @@ class GelLaw:
         """The law of `presses.ball_on_layer` for a thickness in mm: linear at every depth."""
         return cls(LINEAR, LINEAR, "", DEEP_SHARE * thickness_mm, True)
 
-    def at(self, displacement_mm: Array) -> dict[str, Any]:
-        """Law of one frame, and whether its contact is deep, from the motion (c, 3) of the nodes.
+    def at(self, displacement_mm: Array, by_linear_law: bool = False) -> dict[str, Any]:
+        """Law of one frame, and whether its contact is deep.
+
+        Args:
+            displacement_mm: (c, 3) motion of the nodes.
+            by_linear_law: Whether a deep contact has the forces of a linear gel all the same.
 
         Returns:
             `law`, which is `linear` or `neo_hookean`, and `deep`, true or false; null where the
@@ -64,7 +68,8 @@ class GelLaw:
         if not np.isfinite(height).all():
             return {"law": LINEAR if self.law == "auto" else self.law, "deep": None}
         deep = bool(-float(height.min(initial=0.0)) >= self.deep_mm)
-        law = self.law if self.law != "auto" else (STRAINED if deep else LINEAR)
+        by_depth = STRAINED if deep and not by_linear_law else LINEAR
+        law = self.law if self.law != "auto" else by_depth
         return {"law": law, "deep": deep}
 
     def record(self) -> dict[str, Any]:
@@ -123,8 +128,13 @@ class GelUse:
         if self.deep_linear:
             more = ""
             if counted == "frames":
-                remedy = "" if gel.fallback else "; give --gel auto"
+                remedy = "" if gel.fallback or gel.law == "auto" else "; give --gel auto"
                 more = f"; the stated deviation holds this{remedy}"
+            if gel.law == "auto":
+                found.append(
+                    f"In {_number(self.deep_linear, counted)} --gel auto took the linear law "
+                    "because the neo-Hookean gel has no motion that explains the frame."
+                )
             found.append(
                 f"In {_number(self.deep_linear, counted)} the contact is deeper than {deep}, where "
                 f"the linear law gives too little normal force, for a ball 4 % there and 15 % at "

@@ -181,6 +181,8 @@ class JointForces:
         unexplained: Share of the change of light in the region that the forces do not explain.
         shown: (c,) nodes whose slope the light shows; none without light.
         motion: Of the surface nodes.
+        by_linear_law: Whether they are those of a linear gel because the law at large strain
+            explains no motion.
     """
 
     force_n: Array
@@ -194,6 +196,7 @@ class JointForces:
     unexplained: float
     shown: Mask
     motion: GelMotion
+    by_linear_law: bool = False
 
     @property
     def state(self) -> FitState:

@@ -7,7 +7,8 @@ the size of a patch, it depends on the gel too, and its derivative adds G S du/d
 part in G S, because its forces are in balance, but the normal motion depends on its stiffness over
 the modulus. The motion of an object of unknown shape is not given, but follows from its forces with
 the gel: there the source gives the derivatives of these (`joint.off_design`). A linear law leaves
-out a part of the force that grows with the depth (docs/physics.md, "Modulus").
+out a part of the force that grows with the depth (docs/physics.md, "Modulus"). No gel is exactly
+neo-Hookean either: a part of the difference between both laws is left.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ _SKIN_STEP, _LEAST_SKIN_STEP = 0.03, 0.005
 """The same for the skin: a share of its stiffness, and of modulus times thickness."""
 _DEPTHS, _LEFT_OUT = (0.0, 0.1, 0.2, 0.3, 0.5), (0.0, 0.03, 0.11, 0.20, 0.47)
 """Depth of a ball over the thickness, and the share of its force that a linear law leaves out."""
+_LAW_SIGMA = 0.15
+"""Standard deviation of the force of a real gel from that of a neo-Hookean one, over what a linear
+law leaves out."""
 
 
 def varied_bundles(bundle: Bundle, gel: GelCalibration) -> list[tuple[Bundle, Bundle, float]]:
@@ -80,13 +84,15 @@ class GelShare:
         covariance: (1 + p, 1 + p) of ln modulus and of what `varied_bundles` varies.
         by_normal: (6, c) product G S for the normal motion.
         derivative: (p, 6, c, 3) of G S by thickness, ratio and skin.
-        linear_mm: Thickness of a gel whose law is taken to be linear; 0 for another law.
+        thickness_mm: Of the gel.
+        linear: Whether its law is taken to be linear at every depth.
     """
 
     covariance: Array
     by_normal: Array
     derivative: Array
-    linear_mm: float = 0.0
+    thickness_mm: float
+    linear: bool
 
     @classmethod
     def of(cls, bundle: Bundle, gel: GelCalibration, law: str = "linear") -> GelShare:
@@ -103,12 +109,16 @@ class GelShare:
             (more.adjoint.forces - less.adjoint.forces) / (2 * step) for less, more, step in pairs
         ]
         by_normal = gel.varied(bundle).adjoint.forces[:, :, 2] if pairs else np.zeros(shape[1:3])
-        linear_mm = designed_thickness_mm(bundle) if law == "linear" else 0.0
         covariance = varied_covariance(gel, len(pairs))
-        return cls(covariance, by_normal, np.reshape(derivative, shape), linear_mm)
+        whole = np.reshape(derivative, shape)
+        return cls(covariance, by_normal, whole, designed_thickness_mm(bundle), law == "linear")
 
     def added(
-        self, wrench: Wrench, displacement_mm: Array, reading: NormalReading | None = None
+        self,
+        wrench: Wrench,
+        displacement_mm: Array,
+        reading: NormalReading | None = None,
+        by_linear_law: bool = False,
     ) -> Wrench:
         """The wrench with the share of the gel in its covariance.
 
@@ -117,11 +127,14 @@ class GelShare:
             displacement_mm: (c, 3) motion of the surface nodes; z is NaN where it is unknown.
             reading: The normal motion, with its derivatives by thickness, ratio and skin where it
                 depends on the gel, or that of its forces.
+            by_linear_law: Whether these forces are those of a linear gel although its law is
+                another one.
         """
         parts = self._by_gel(displacement_mm, reading)
         by_gel = np.vstack([np.nan_to_num(wrench.vector), parts])
         share = by_gel.T @ self.covariance @ by_gel
         left_out = self._left_out(displacement_mm) * by_gel[0]
+        left_out *= 1.0 if self.linear or by_linear_law else _LAW_SIGMA
         total = wrench.covariance + share + np.outer(left_out, left_out)
         return replace(wrench, covariance=total)
 
@@ -137,7 +150,5 @@ class GelShare:
 
     def _left_out(self, displacement_mm: Array) -> float:
         """Share of the force that the linear law leaves out; 0 where the depth is unknown."""
-        if not self.linear_mm:
-            return 0.0
         depth = -float(np.nan_to_num(displacement_mm[:, 2]).min(initial=0.0))
-        return float(np.interp(depth / self.linear_mm, _DEPTHS, _LEFT_OUT))
+        return float(np.interp(depth / self.thickness_mm, _DEPTHS, _LEFT_OUT))

@@ -46,10 +46,10 @@ def test_run_folder_and_answer(sensor: Path, tmp_path: Path, capsys) -> None:
     answer = json.loads(capsys.readouterr().out)
     assert answer["frames"] == answer["frames_with_forces"] == 5
     frames = {"linear": 5, "neo_hookean": 0, "deep_linear": 0}
-    gel = {"asked": "linear", "law": "linear", "fallback": None, "frames": frames}
+    gel = {"asked": "auto", "law": "auto", "fallback": None, "frames": frames}
     assert answer["gel"] == gel
     settings = read_run(tmp_path / "run").manifest["settings"]
-    assert (settings["gel_law"], settings["gel_fallback"]) == ("linear", None)
+    assert (settings["gel_law"], settings["gel_fallback"]) == ("auto", None)
     assert len(answer["pictures"]) == 2
     assert all(Path(p).stat().st_size > 10_000 for p in answer["pictures"])
     recorded = read_run(tmp_path / "run")

@@ -22,8 +22,8 @@ from sigma_gate import Score, _kept
 
 from gelslim_force.built_sensor import built_gel
 from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.joint.sensor_source import unknown_shape
 from gelslim_force.joint.settings import JointSettings
-from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings
 

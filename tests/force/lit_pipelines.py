@@ -9,8 +9,9 @@ import numpy as np
 from pressed_samples import calibration, lit_bundle, reference
 
 from gelslim_force.joint.checked_indenter import CheckedIndenter
+from gelslim_force.joint.sensor_source import unknown_shape
 from gelslim_force.joint.settings import WITNESS, JointSettings
-from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
+from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import indenter_source, open_sensor
 from gelslim_force.settings import PipelineSettings

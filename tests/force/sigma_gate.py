@@ -26,8 +26,8 @@ from sigma_cases import (
 )
 
 from gelslim_force.built_sensor import BuiltGel, built_gel
+from gelslim_force.joint.sensor_source import unknown_shape
 from gelslim_force.joint.settings import JointSettings
-from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import normal_source
 from gelslim_force.settings import PipelineSettings

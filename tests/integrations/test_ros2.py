@@ -185,7 +185,7 @@ def test_a_pressed_sensor_gives_the_forces_of_its_pipeline() -> None:
     """Drawn pictures of a pad under known tractions, at rest and pressed, then a new rest."""
     from pressed_samples import calibration, lit_bundle, pressed, reference
 
-    from gelslim_force.joint.unknown_shape import unknown_shape
+    from gelslim_force.joint.sensor_source import unknown_shape
     from gelslim_force.pipeline import ForcePipeline
     from gelslim_ros.force_server import ForceServer
 

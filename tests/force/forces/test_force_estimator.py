@@ -9,7 +9,9 @@ from scipy.spatial import cKDTree
 
 from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
 from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm
+from gelslim_force.forces.frame_result import ForceField
 from gelslim_force.forces.wrench import WrenchNoise, resultant, rigid_motions
+from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 from ifem_export.inverse.contact_inverse import masked_force
 from ifem_export.mesh.surface_lattice import surface_share_mm2
 from ifem_export.operators.ladder import lumped, refined
@@ -169,6 +171,25 @@ def test_the_law_follows_the_depth(case) -> None:
     unit = moved / -moved[:, 2].min() * law.from_mm
     assert (law.force(0.99 * unit) == operator.force(0.99 * unit)).all()
     assert (law.force(1.01 * unit) == strained.force(1.01 * unit)).all()
+    assert not law.of(1.01 * unit).by_linear_law
+
+
+def test_a_motion_that_no_gel_has_gets_linear_forces_which_are_told(case) -> None:
+    bundle, operator, _, moved = case
+    thickness = bundle.mesh.layers * bundle.mesh.cell_size_mm[2]
+    inverted = moved * [1.0, 1.0, 1.5 * thickness / -moved[:, 2].min()]
+    strained = FiniteStrainForce(bundle)
+    with pytest.raises(FiniteStrainError):
+        strained.force(inverted)
+    law = DepthLaw(operator, strained, deep_mm(bundle))
+    found = law.of(inverted)
+    assert found.by_linear_law
+    assert (found.force_n == operator.force(inverted)).all()
+    estimator = ForceEstimator(bundle.mesh, operator, ForceSettings(method="direct"), law)
+    field = estimator.estimate(inverted)
+    assert field.by_linear_law
+    assert ForceField.from_record(field.to_record()).by_linear_law
+    assert not estimator.estimate(0.5 * moved).by_linear_law
 
 
 @pytest.mark.parametrize("steps", [0, 9])

@@ -43,6 +43,7 @@ def test_auto_takes_the_law_by_the_depth_of_the_frame() -> None:
     assert gel.at(motion(0.9 * TENTH_MM)) == {"law": "linear", "deep": False}
     assert gel.at(motion(1.1 * TENTH_MM)) == {"law": "neo_hookean", "deep": True}
     assert gel.at(motion(np.nan)) == {"law": "linear", "deep": None}
+    assert gel.at(motion(0.5), by_linear_law=True) == {"law": "linear", "deep": True}
 
 
 @pytest.mark.parametrize("asked", ["linear", "neo_hookean"])
@@ -67,6 +68,10 @@ def test_sentences_tell_what_was_used_and_only_that() -> None:
     assert len(mixed.sentences(auto)) == 2
     assert len(GelUse(linear=5).sentences(linear)) == 1
     assert len(GelUse(linear=5, deep_linear=1).sentences(linear)) == 2
+    assert "--gel auto" in GelUse(linear=5, deep_linear=1).sentences(linear)[1]
+    instead = GelUse(linear=5, deep_linear=1).sentences(auto)
+    assert len(instead) == 4
+    assert "give --gel auto" not in " ".join(instead)
     assert GelUse().sentences(linear) == ()
     unseen = GelLaw.of(bundle, "auto", depth_seen=False)
     assert GelUse(5).sentences(unseen) != GelUse(5).sentences(auto)

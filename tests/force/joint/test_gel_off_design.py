@@ -19,8 +19,9 @@ from sigma_gate import WIDE, scores, summaries
 from gelslim_force.joint.fit_state import JointForces
 from gelslim_force.joint.light.rows import LightRows
 from gelslim_force.joint.light.sums import LightSums
+from gelslim_force.joint.sensor_source import unknown_shape
 from gelslim_force.joint.settings import ON_NODES, JointSettings
-from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
+from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.presses.gel_calibration import specified_gel
 from gelslim_force.presses.gel_share import varied_bundles
 from ifem_export.bundle.bundle import Bundle

@@ -20,8 +20,8 @@ from gelslim_force.joint.light.calibration import (
     read_light_calibration,
     write_light_calibration,
 )
+from gelslim_force.joint.sensor_source import unknown_shape
 from gelslim_force.joint.settings import JointSettings
-from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import SensorError, open_sensor
 from gelslim_optics.light.light_law import LightLaw

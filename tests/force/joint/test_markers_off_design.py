@@ -19,7 +19,8 @@ from sigma_gate import COVERAGE, RMS, condition_of
 
 from gelslim_force.built_sensor import BuiltGel, built_gel
 from gelslim_force.joint.fit_state import JointForces
-from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
+from gelslim_force.joint.sensor_source import unknown_shape
+from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings
 

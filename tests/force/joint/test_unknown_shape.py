@@ -32,9 +32,10 @@ from gelslim_force.calibration.file import write_calibration
 from gelslim_force.forces.finite_strain import FiniteStrainForce, HeldPad
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.off_design import OffDesign
+from gelslim_force.joint.sensor_source import unknown_shape
 from gelslim_force.joint.settings import ON_NODES, JointSettings
 from gelslim_force.joint.strained_gel import StrainedGel
-from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
+from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.presses.gel_calibration import specified_gel
 from gelslim_force.presses.gel_share import varied_bundles
@@ -220,7 +221,8 @@ def test_a_law_that_fails_gives_a_reason_and_no_force(monkeypatch: pytest.Monkey
     source = pipeline().normal
     assert isinstance(source, UnknownShape)
     gel = StrainedGel(cast(FiniteStrainForce, Failing()), lambda force_n: force_n, 0.0)
-    strained = replace(source.estimator, strained=gel)
+    linear = source.estimator
+    strained = replace(linear, strained=gel)
     monkeypatch.setattr(source, "estimator", strained)
     found = processed(pressed(13).image)
     assert not found.normal_known
@@ -228,6 +230,16 @@ def test_a_law_that_fails_gives_a_reason_and_no_force(monkeypatch: pytest.Monkey
     assert found.wrench is not None
     assert np.isnan(found.wrench.force_n[2])
     assert np.isfinite(found.wrench.force_n[:2]).all()
+    monkeypatch.setattr(source, "without_strain", linear)
+    instead = processed(pressed(13).image)
+    assert instead.normal_known
+    assert instead.field is not None
+    assert instead.field.by_linear_law
+    monkeypatch.undo()
+    expected = processed(pressed(13).image)
+    assert instead.wrench is not None
+    assert expected.wrench is not None
+    np.testing.assert_array_equal(instead.wrench.vector, expected.wrench.vector)
 
 
 @dataclass

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.light.calibration import LightCalibration
+from gelslim_force.joint.sensor_source import unknown_shape
 from gelslim_force.joint.settings import JointSettings
-from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.presses.ball_check import fitted_ball
 from gelslim_force.presses.calibrate_light import calibrate_light

@@ -55,7 +55,7 @@ def force(
     method: option.Method = "auto",
     compensation: option.Compensation = "exact",
     interpolation: option.Interpolation = "sparse",
-    gel: option.GelLaw = "linear",
+    gel: option.GelLaw = "auto",
     finer_pressure: option.FinerPressure = True,
     friction: option.Friction = 1.0,
     drift: option.Drift = "correct",
