@@ -18,6 +18,7 @@ import argparse
 import csv
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -190,7 +191,7 @@ class Trial:
         frames = self.kept / FRAMES[law]
         if not frames.exists():
             return [], []
-        run = self.kept / f"{way}, {law}".replace(", ", "_").replace(" ", "_")
+        run = self.kept / re.sub(r"\W+", "_", f"{way} {law}")
         gelslim(
             "force", str(self.bundle), str(frames), *told,
             "-o", str(run), "--force", "--pictures", "0",

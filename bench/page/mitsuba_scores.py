@@ -48,15 +48,17 @@ class Scores:
             for true, row in zip(record["truth"], rows, strict=True)
             if row is not None and true["name"].startswith(kind)
         ]
-        found, sigma = (
-            np.array([row[key] for _, row in pairs], dtype=float) for key in ("wrench", "sigma")
+        truth, found, sigma = (
+            np.array(part, dtype=float).reshape(-1, 6)
+            for part in (
+                [true["wrench"] for true, _ in pairs],
+                [row["wrench"] for _, row in pairs],
+                [row["sigma"] for _, row in pairs],
+            )
         )
-        truth = np.array([true["wrench"] for true, _ in pairs], dtype=float)
-        centres = [
-            np.array([v["centre_mm"] for v in part], dtype=float)
-            for part in zip(*pairs, strict=True)
-        ]
-        return cls(truth, found, sigma, np.hypot(*(centres[1] - centres[0]).T))
+        centres = [[true["centre_mm"], row["centre_mm"]] for true, row in pairs]
+        off = np.diff(np.array(centres, dtype=float).reshape(-1, 2, 2), axis=1)[:, 0]
+        return cls(truth, found, sigma, np.hypot(*off.T))
 
     @property
     def z(self) -> Array:
