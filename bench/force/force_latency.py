@@ -122,7 +122,8 @@ def all_chains(
 ) -> Iterator[tuple[str, Chain]]:
     """The chains compared, by name."""
     known = [share * rig.press.nodes_mm[:, 2] for share in shares(CYCLE)]
-    loose = PipelineSettings(budget=Budget(error=LOOSE))
+    linear = PipelineSettings(gel="linear")
+    loose = replace(linear, budget=Budget(error=LOOSE))
     for suffix, chosen, gel in (
         ("", JointSettings(), "linear"),
         (", on nodes", ON_NODES, "linear"),
@@ -133,10 +134,14 @@ def all_chains(
         anything = unknown_shape(rig.bundle, calibration, frames[0], gel=gel, settings=drawn)
         chain = ForcePipeline(rig.bundle, calibration, PipelineSettings(gel=gel), anything)
         yield f"any object{suffix}", pipeline_chain(chain, frames, clock)
-    for suffix, settings in (("", None), (f", {LOOSE:.0%}", loose)):
+    for suffix, settings in (
+        ("", linear),
+        (f", {LOOSE:.0%}", loose),
+        (", gel auto", PipelineSettings()),
+    ):
 
         def opened(
-            settings: PipelineSettings | None = settings, normal: NormalSource | None = None
+            settings: PipelineSettings = settings, normal: NormalSource | None = None
         ) -> ForcePipeline:
             return ForcePipeline(rig.bundle, calibration, settings, normal)
 

@@ -22,8 +22,8 @@ from gelslim_twin.render.image_sensor import Exposure
 
 TARGET = ROOT / "docs" / "images" / "force_overlay.png"
 STEPS, SHARE = 7, 0.35
-"""Steps of the push, and its end as a share of the press of the rig: less than a tenth of the thickness
-deep, where the gel of both is linear."""
+"""Steps of the push, and its end as a share of the press of the rig: less than a tenth of the
+thickness deep, where the gel of both is linear."""
 MODULUS_SHARE, THICKNESS_SHARE, RATIO = 0.03, 0.015, 0.004
 """Standard deviations of a gel that was calibrated with a ball and a scale."""
 

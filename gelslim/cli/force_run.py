@@ -232,8 +232,8 @@ Interpolation = Annotated[str, typer.Option(help="From markers to nodes: sparse 
 GelLaw = Annotated[
     str,
     typer.Option(
-        help="Law of the gel: auto takes the neo-Hookean one for contacts deeper than a tenth of the "
-        "thickness; linear or neo_hookean at any depth."
+        help="Law of the gel: auto takes the neo-Hookean one for contacts deeper than a tenth of "
+        "the thickness; linear or neo_hookean at any depth."
     ),
 ]
 FinerPressure = Annotated[
