@@ -7,7 +7,7 @@ of a component is its error over its standard deviation.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,9 @@ class Score:
 @cache
 def _gel(wide: bool = False) -> BuiltGel:
     """The gel as specified; its share of the covariance is that of a gel whose law is linear."""
-    return built_gel(specified_bundle(wide), calibration(), None, PipelineSettings(gel="auto"))
+    gel = built_gel(specified_bundle(wide), calibration(), None, PipelineSettings(gel="auto"))
+    assert gel.share is not None
+    return replace(gel, share=replace(gel.share, thickness_mm=np.inf))
 
 
 @cache
