@@ -56,7 +56,8 @@ RATE_SAFETY, LEAST_RATE = 2.0, 0.05
 """Factor on the rate at which corrections were last seen to become smaller, and its least value."""
 GROWTH = 3.0
 """Factor on what the next correction is expected to change: the two laws differ by the square of
-the displacement, so that the change per displacement grows along a path."""
+the displacement, so that the change per displacement grows along a path. It grows with the size of
+the contact, where that becomes larger again after a release."""
 MOST_CORRECTIONS = 6
 CONVERGED, CONVERGED_SHARE = 1e-2, 0.2
 """Largest tolerance of `NonlinearContact` where corrections do not converge, and as a share of the
@@ -170,7 +171,19 @@ class _LastCorrected:
         if not self.state.force_n.any():
             return inf, inf
         mm, n = _apart(now, self.state)
-        return GROWTH * self.per_mm * mm, GROWTH * self.per_n * n
+        grown_mm, grown_n = map(_growth, _size(now), _size(self.state))
+        return grown_mm * self.per_mm * mm, grown_n * self.per_n * n
+
+
+def _size(state: GelState) -> tuple[float, float]:
+    """Largest displacement in mm, and the resultant in N."""
+    resultant_n = float(np.linalg.norm(state.force_n.sum(axis=0)))
+    return float(np.abs(state.displacement_mm).max()), resultant_n
+
+
+def _growth(now: float, before: float) -> float:
+    """How much the change per displacement grows to a contact of another size."""
+    return max(GROWTH, GROWTH * now / before if before > 0 else inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -234,15 +234,52 @@ def test_a_correction_tells_what_looser_rungs_leave_and_keep() -> None:
     A fifth of the change is left where the path stops, a third of that where it does not correct.
     """
     found = found_error(corrected(), 0.01)
-    assert values(found) == pytest.approx(values(CHANGE.times(1.25 * (0.2 + 0.2 / 3))))
-    # Half is left after one correction at most, and all of the change where there is none.
-    assert values(found_error(corrected(), 1.0)) == pytest.approx(values(CHANGE.times(1.25 * 1.5)))
-    # Aside each observable has its own limit: 0.5, and 0.1 of 0.3 px.
+    assert values(found) == pytest.approx(values(CHANGE.times(1.35 * (0.2 + 0.2 / 3))))
+    # A correction that changes a twentieth leaves a tenth and twice that at most.
+    loose = found_error(corrected(), 1.0)
+    assert values(loose) == pytest.approx(values(CHANGE.times(1.35 * (0.1 + 2 * 0.05 + 1))))
+    # Half is left at most, and all of the change where there is no correction.
+    large = CHANGE.times(5)
+    most = found_error(corrected(large), 1.0)
+    assert values(most) == pytest.approx(values(large.times(1.35 * 1.5)))
+    # Aside each observable has its own limit: 0.02 N and 0.1 px.
     aside = values(found_error(corrected(motion=replace(PRESSED, lateral_mm=0.2)), 0.01))
-    expected = (0.02 + 0.02 / 3, 0.1 + 0.1 / 3, 0.1 + 0.1 / 3, 0.1 + 0.1 / 3)
+    expected = (0.2 * 0.04 + 0.02 / 3, 0.1 + 0.1 / 3, 0.06 + 0.1 / 3, 0.06 + 0.1 / 3)
     assert aside == pytest.approx([2.5 * e for e in expected])
     back = found_error(corrected(motion=replace(PRESSED, recedes=True)), 0.01)
-    assert values(back) == pytest.approx([2 * value for value in values(found)])
+    assert values(back) == pytest.approx([2.5 / 1.35 * value for value in values(found)])
+
+
+def test_a_tool_that_slides_back_promises_no_more_below_a_tolerance() -> None:
+    """With friction and without walls: nodes slip at other poses, as in random scene 3208."""
+    back = replace(PRESSED, lateral_mm=0.2, recedes=True)
+    c = corrected(motion=back)
+    assert c.friction > 0
+    least = corrected_error(c, 0.015)
+    assert corrected_error(c, 0.02).displacement_px > least.displacement_px
+    assert corrected_error(c, 0.001) == least
+    for other in (replace(c, friction=0.0), corrected(motion=replace(back, recedes=False))):
+        assert corrected_error(other, 0.001).displacement_px < least.displacement_px / 5
+
+
+def test_strain_at_walls_may_make_them_hold_a_node_otherwise_at_every_tolerance() -> None:
+    """As in random scenes 3209 and 3214: by 1.25 times the depth and the force of two nodes.
+
+    A node that only one of the two gels holds changes by more than a third of the depth.
+    """
+    depth_px = corrected().contact.depth_mm * FIGURES.px_per_mm
+    shares = (0.09, 0.2, 0.4)
+    for tolerance in (0.001, HELD_AT):
+        alike, strained, other = (
+            corrected(Bound(0.04, share * depth_px, 0.1, 0.1), steepest=math.inf)
+            for share in shares
+        )
+        promised = corrected_error(other, tolerance)
+        held = corrected_error(strained, tolerance)
+        assert held.displacement_px - promised.displacement_px == pytest.approx(1.25 * depth_px)
+        lost_n = 1.25 * 2 / strained.contact_nodes * strained.force_n
+        assert held.force_n - promised.force_n == pytest.approx(lost_n)
+        assert corrected_error(alike, tolerance).displacement_px <= promised.displacement_px
 
 
 def test_what_is_found_of_rungs_only_lowers_what_they_promise() -> None:
