@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from gelslim_twin.effects.effect import Bound, combined, unit_of
 from gelslim_twin.effects.registry import EFFECTS
+from gelslim_twin.planning.order import application_order
 from gelslim_twin.planning.plan import Choice, Plan
-from gelslim_twin.planning.planner import application_order
 from gelslim_twin.planning.question import question
 from gelslim_twin.scene.draw import corner
 from gelslim_twin.scene.reader import LoadedScene

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from gelslim_core.errors import GelslimError
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import GIVEN, Bound, Effect, Rung, unit_of
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.planning.leftover import with_leftover_spent
-from gelslim_twin.planning.plan import Choice, Plan
+from gelslim_twin.planning.leftover import ROUNDING, with_leftover_spent
+from gelslim_twin.planning.order import ordered
+from gelslim_twin.planning.plan import Choice, Plan, summed_error
 
 
 class PlanError(GelslimError, ValueError):
@@ -41,19 +43,19 @@ class Question:
     circumstances: Circumstances
     left_out: frozenset[str] = frozenset()
     """Effects that are left out together, each of which has its part of their common size."""
-    _kept: dict[Effect, tuple[Bound, tuple[Rung, ...]]] = field(
+    _kept: dict[str, tuple[Bound, tuple[Rung, ...]]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
     """Bounds and ladders by effect, since the planner needs them in every iteration."""
 
     def weighed(self, effect: Effect) -> tuple[Bound, tuple[Rung, ...]]:
         """The size of an effect (zero where its parameters do nothing) and its ladder."""
-        if effect not in self._kept:
+        if effect.name not in self._kept:
             c = self.circumstances
             bound = effect.size(c)
             bound = Bound() if effect.is_null(c, bound) else bound
-            self._kept[effect] = bound, tuple(effect.ladder(c))
-        return self._kept[effect]
+            self._kept[effect.name] = bound, tuple(effect.ladder(c))
+        return self._kept[effect.name]
 
     def tolerance(self, observable: str) -> float:
         """Of one observable, in its unit."""
@@ -92,8 +94,39 @@ def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
     if jointly is None:
         return one_by_one
     together = _plan(jointly, effects)
-    over = {o for o, _ in together.over_tolerance} - {o for o, _ in one_by_one.over_tolerance}
+    over = _exceeded(question, together) - _exceeded(question, one_by_one)
     return one_by_one if over or together.predicted_ms > one_by_one.predicted_ms else together
+
+
+def are_left_out(question: Question, effects: Sequence[Effect] = EFFECTS) -> bool:
+    """Whether the effects that a probe left out together may be left out within the tolerance.
+
+    Whether that saves time is decided by `make_plan`. Raises as that.
+    """
+    jointly = question.with_together()
+    return jointly is not None and not _exceeded(jointly, _plan(jointly, effects))
+
+
+def with_effects(
+    question: Question, plan: Plan, names: Collection[str], effects: Sequence[Effect] = EFFECTS
+) -> Plan:
+    """A plan with effects that it leaves out, by their cheapest sufficient rungs."""
+    choices = {c.effect: c for c in plan.choices}
+    for effect in effects:
+        if effect.name in names:
+            shares, ladder = dict(choices[effect.name].shares), question.weighed(effect)[1]
+            choices[effect.name] = _choice(question, effect, "drawn by a probe", shares, ladder)
+    order = ordered([e for e in effects if choices[e.name].included])
+    return replace(plan, choices=tuple(choices.values()), order=tuple(e.name for e in order))
+
+
+def _exceeded(question: Question, plan: Plan) -> set[str]:
+    """Observables whose tolerance is exceeded by effects that the scene does not switch off."""
+    parameters = question.circumstances.parameters
+    counted = [c for c in plan.choices if parameters[c.effect].use != "off"]
+    return {
+        o for o in question.observe if summed_error(counted, o) > question.tolerance(o) * ROUNDING
+    }
 
 
 def _plan(question: Question, effects: Sequence[Effect]) -> Plan:
@@ -109,7 +142,7 @@ def _plan(question: Question, effects: Sequence[Effect]) -> Plan:
         if wanted == needed:
             break
         needed = wanted
-    order, c = _ordered([e for e in effects if decided[e.name].included]), question.circumstances
+    order, c = ordered([e for e in effects if decided[e.name].included]), question.circumstances
     return Plan(
         question.name,
         question.observe,
@@ -267,23 +300,21 @@ def _choice(
 ) -> Choice:
     """Simulate an effect by a rung of `ladder`, or leave it out where there is no ladder."""
     size, every = question.weighed(effect)
-    absent = Choice(
-        effect.name,
-        False,
-        why,
-        size,
-        tuple(shares.items()),
-        size,
-        probed=effect.was_probed(question.circumstances),
-        formula=effect.formula,
-        is_scattered=effect.is_scattered,
-    )
+    known: dict[str, Any] = {
+        "effect": effect.name,
+        "why": why,
+        "size": size,
+        "shares": tuple(shares.items()),
+        "probed": effect.was_probed(question.circumstances),
+        "formula": effect.formula,
+        "is_scattered": effect.is_scattered,
+    }
     if ladder is None:
         saved_ms = _rung(every, shares).milliseconds if size != Bound() else 0.0
-        return replace(absent, saved_ms=saved_ms)
+        return Choice(**known, included=False, error=size, saved_ms=saved_ms)
     rung = _rung(ladder, shares)
-    return replace(
-        absent,
+    return Choice(
+        **known,
         included=True,
         error=rung.error,
         rung=rung.name,
@@ -295,6 +326,8 @@ def _choice(
 
 def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
     """The cheapest rung within the shares, or else the one that exceeds them least."""
+    if len(ladder) == 1:
+        return ladder[0]
     errors = [
         max((_excess(r.error.of(o), s) for o, s in shares.items()), default=0.0) for r in ladder
     ]
@@ -303,35 +336,3 @@ def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
         return ladder[min(able, key=lambda k: ladder[k].milliseconds)]
     totals = [sum(r.error.of(o) for o in shares) for r in ladder]
     return ladder[min(range(len(ladder)), key=lambda k: (errors[k], totals[k]))]
-
-
-def application_order(effects: Sequence[Effect]) -> tuple[str, ...]:
-    """Names of effects in the order in which they are applied."""
-    return tuple(effect.name for effect in _ordered(effects))
-
-
-def _ordered(effects: Sequence[Effect]) -> list[Effect]:
-    """Topological order: providers, their refinements, their users; `after` is respected.
-
-    Effects that do not depend on each other keep the order of the registry. Raises ValueError
-    where the declarations form a cycle.
-    """
-    before = {e.name: {o.name for o in effects if o is not e and _precedes(o, e)} for e in effects}
-    left, order = list(effects), list[Effect]()
-    done: set[str] = set()
-    while left:
-        ready = next((e for e in left if before[e.name] <= done), None)
-        if ready is None:
-            raise ValueError(f"the effects form a cycle: {', '.join(e.name for e in left)}")
-        left.remove(ready)
-        order.append(ready)
-        done.add(ready.name)
-    return order
-
-
-def _precedes(one: Effect, other: Effect) -> bool:
-    if one.name in other.after:
-        return True
-    if set(one.provides) & {*other.needs, *other.refines}:
-        return True
-    return bool(set(one.refines) & (set(other.needs) - set(other.refines)))

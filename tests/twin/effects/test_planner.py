@@ -23,7 +23,14 @@ from gelslim_twin.effects.contact_estimate import Footprint
 from gelslim_twin.effects.effect import GIVEN, OBSERVABLES, Bound, Effect, Rung, picture
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.planning.planner import PlanError, Question, _equal_share, _shares, make_plan
+from gelslim_twin.planning.planner import (
+    PlanError,
+    Question,
+    _equal_share,
+    _shares,
+    are_left_out,
+    make_plan,
+)
 from gelslim_twin.planning.question import plan_scene, question
 from gelslim_twin.scene.reader import read_scene
 
@@ -459,3 +466,22 @@ def test_effects_found_small_together_are_left_out_together_or_not_at_all(tmp_pa
     assert large.choices == planned_with(None).choices
     assert not {large.choice(name).why for name in names} & {"small with others"}
     assert not large.over_tolerance
+
+
+def test_what_a_scene_switches_off_does_not_excuse_what_is_left_out_together(tmp_path):
+    """The error of an effect that is switched off counts apart, however large it is."""
+    text = observing("image") + (
+        "tolerance: {image_px: 0.6}\n"
+        "effects: {exposure: {gain: 1.4}, compression: {use: 'off', quality: 50}}\n"
+    )
+    asked = question(load(tmp_path, text), SENSOR)
+    bounded = make_plan(asked)
+    assert dict(bounded.over_tolerance)["image"] > 0.6
+    names = ("shading", "defocus", "exposure", "sensor_noise")
+    for whole_px, fits in ((0.3, True), (1.1, False)):
+        parts = {n: picture(whole_px / len(names)) for n in names}
+        found = Probed(0.2, 0.2, 0.2, {}, together=parts)
+        known = replace(asked, circumstances=replace(asked.circumstances, probed=found))
+        assert are_left_out(known) == fits
+        assert ({*names} & {*make_plan(known).order} == set()) == fits
+    assert not are_left_out(asked)
