@@ -20,9 +20,9 @@ from random_contact_scenes import random_contact
 from bench.rigs.twin_rig import mechanics_key
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
+from gelslim_twin.planning.grey_sizes import SHADING
 from gelslim_twin.planning.plan import Plan, summed_error
 from gelslim_twin.planning.planner import make_plan
-from gelslim_twin.planning.probing import SHADING
 from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.scene_mechanics import mechanics_of

@@ -268,7 +268,7 @@ class Circumstances:
         """Nodes under the tool at the deepest contact."""
         return self.contact.area_mm2 / self.sensor.node_pitch_mm**2
 
-    @property
+    @cached_property
     def has_walls(self) -> bool:
         """Whether a wall of the tool reaches into the gel."""
         return math.isinf(self.footprint.steepest(self.contact.depth_mm))

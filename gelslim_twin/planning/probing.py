@@ -15,9 +15,16 @@ from gelslim_twin.effects.effect import Rung
 from gelslim_twin.effects.grey_values import shading_ladder
 from gelslim_twin.effects.large_strain import convergence_ms, correction_ms
 from gelslim_twin.effects.registry import EFFECTS
+from gelslim_twin.planning.grey_sizes import (
+    FLOOR_PX,
+    PICTURED,
+    SHADING,
+    effects_to_draw,
+    likely_small,
+)
 from gelslim_twin.planning.plan import Choice, Plan
 from gelslim_twin.planning.planner import Question
-from gelslim_twin.scene.pose import Pose
+from gelslim_twin.planning.probed_path import MOST_POSES, straight_poses
 
 MOTION_BLUR = "motion_blur"
 PROBED = ("friction", "nonlinearity", "relaxation", MOTION_BLUR)
@@ -25,29 +32,19 @@ PROBED = ("friction", "nonlinearity", "relaxation", MOTION_BLUR)
 LEFT_OUT = ((), ("friction",), ("friction", MOTION_BLUR), ("friction", "nonlinearity"))
 """Effects that a probe leaves out until it pays, one set after the other: friction takes a second
 path, and large strain saves most of the time but takes corrections."""
-NOISE = "sensor_noise"
-SHADING = "shading"
-PICTURED = (SHADING, "defocus", NOISE, "exposure", "specular", "dirt")
-"""Effects of the picture that a probe draws: they change grey values, and a picture is evaluated by
-its dots. Of shading it finds the change of the light too, because that is read from a picture."""
 FIND_MS = 8.0
 """Time of finding the dots of a picture of 640 x 480 pixels."""
-FLOOR_PX = 0.01
-"""What is added to the shift of dots between pictures: as much as a change of a few pixels by one
-grey value may move a dot."""
 LEAST_PICTURES = 2
 """Pictures that show what effects do together: one with all of them and one without any."""
 MOST_SHARE = 0.05
 """Largest time of a probe over that of the run with large strain solved to convergence, both as
 declared."""
-PAYING_SHARE = 0.25
-"""Time of the pictures of a probe over what they may save, up to which any run has them drawn."""
+PAYING_SHARE = 0.6
+"""Time of the pictures of a probe over what they are likely to save, up to which any run has them
+drawn."""
 USUAL_STRAIN = 0.5
 """Share of the declared time of large strain that counts for the pictures of a probe: small
 contacts converge faster, unless walls slide."""
-MOST_POSES, STRAIGHT_POSES = 12, 4
-"""Poses of the path that a probe solves on a linear gel, and those of a straight press, of which
-the deepest is the hardest."""
 FASTEST_POSES = 2
 """Further poses for the speed of the dots."""
 
@@ -85,30 +82,22 @@ def _pictured(question: Question, plan: Plan, solved: tuple[str, ...]) -> tuple[
     return found if most_pictures(question, plan, solved) >= LEAST_PICTURES else ()
 
 
-def effects_to_draw(question: Question, plan: Plan) -> tuple[str, ...]:
-    """The effects on grey values that a plan includes and may leave out."""
-    return tuple(
-        c.effect
-        for c in plan.included
-        if c.effect in PICTURED and question.circumstances.parameters[c.effect].use == "auto"
-    )
-
-
 def most_pictures(question: Question, plan: Plan, solved: Sequence[str]) -> int:
     """Number of pictures that a probe may draw, after it has solved the size of effects.
 
-    They take no more than their share of the run, or a small part of what they may save.
+    They take no more than their share of the run and what they may save, or a part of what they are
+    likely to save.
     """
     if question.image_px <= 2 * FLOOR_PX:
         return 0
-    names = effects_to_draw(question, plan)
-    saved_ms = plan.poses * sum(c.predicted_ms for c in plan.included if c.effect in names)
+    names, likely = effects_to_draw(question, plan), likely_small(question, plan)
+    ms = {c.effect: c.predicted_ms * plan.poses for c in plan.included}
     spent_ms = probe_ms(question, plan, solved)
     strained = 1.0 if question.circumstances.has_sliding_walls else USUAL_STRAIN
     left_ms = MOST_SHARE * _run_ms(question, plan, strained) - spent_ms
     # Where nothing else is probed, poses are solved for the pictures alone.
-    paying_ms = PAYING_SHARE * saved_ms - (0.0 if solved else spent_ms)
-    most_ms = min(max(left_ms, paying_ms), saved_ms)
+    paying_ms = PAYING_SHARE * sum(ms[e] for e in likely) - (0.0 if solved else spent_ms)
+    most_ms = max(min(left_ms, sum(ms[e] for e in names)), paying_ms)
     return max(0, math.floor(most_ms / picture_ms(question, plan)))
 
 
@@ -131,7 +120,7 @@ def probe_ms(question: Question, plan: Plan, effects: Sequence[str]) -> float:
     linear_ms = chosen["normal_contact"] + chosen.get("friction", 0.0)
     paths = 2 if "friction" in effects else 1
     straight = question.circumstances.motion.is_straight
-    poses = STRAIGHT_POSES if straight else MOST_POSES
+    poses = straight_poses(question.circumstances) if straight else MOST_POSES
     poses = min(poses + (FASTEST_POSES if MOTION_BLUR in effects else 0), plan.poses)
     # A correction of the hardest pose, or of two; setting up the law takes as long as one.
     laws = 0 if "nonlinearity" not in effects else 2 if straight else 3
@@ -151,60 +140,3 @@ def picture_ms(question: Question, plan: Plan) -> float:
 def coarsest_shading(circumstances: Circumstances) -> Rung:
     """The first rung of shading, with which a probe draws."""
     return shading_ladder(circumstances)[0]
-
-
-def probed_poses(
-    poses: Sequence[Pose], is_straight: bool = False, reach_mm: float | None = None
-) -> tuple[Pose, ...]:
-    """A few poses of a path, in order: its extremes, its end, and others evenly between.
-
-    Extremes are the deepest pose, the one farthest aside from where the deepest is, and those of
-    the largest twist and tilt. With `reach_mm`, the distance from the axis of the tool to the rim
-    of the contact, the two poses between which the tool is fastest are among them.
-    """
-    most = STRAIGHT_POSES if is_straight else MOST_POSES
-    fastest = set[int]() if reach_mm is None else _fastest(poses, reach_mm)
-    most += len(fastest)
-    if len(poses) <= most:
-        return tuple(poses)
-    every = range(len(poses))
-    deepest = max(every, key=lambda k: poses[k].depth_mm)
-    still = poses[deepest]
-
-    def aside(k: int) -> float:
-        return (poses[k].x_mm - still.x_mm) ** 2 + (poses[k].y_mm - still.y_mm) ** 2
-
-    kept = {
-        deepest,
-        len(poses) - 1,
-        max(every, key=aside),
-        max(every, key=lambda k: abs(poses[k].twist_deg - still.twist_deg)),
-        max(every, key=lambda k: abs(poses[k].tilt_x_deg) + abs(poses[k].tilt_y_deg)),
-        *fastest,
-    }
-    # The pose that lies farthest from those kept comes next.
-    while len(kept) < most:
-        kept.add(max(every, key=lambda k: min(abs(k - other) for other in kept)))
-    return tuple(poses[k] for k in sorted(kept))
-
-
-def _fastest(poses: Sequence[Pose], reach_mm: float) -> set[int]:
-    """The two poses between which the tool in contact moves fastest."""
-
-    def speed(k: int) -> float:
-        a, b = poses[k - 1], poses[k]
-        if max(a.depth_mm, b.depth_mm) <= 0:
-            return 0.0
-        turns = (
-            b.twist_deg - a.twist_deg,
-            b.tilt_x_deg - a.tilt_x_deg,
-            b.tilt_y_deg - a.tilt_y_deg,
-        )
-        turned_mm = reach_mm * math.radians(sum(map(abs, turns)))
-        way_mm = math.dist((a.x_mm, a.y_mm, a.depth_mm), (b.x_mm, b.y_mm, b.depth_mm))
-        return (way_mm + turned_mm) / (b.time_s - a.time_s)
-
-    if len(poses) < 2:
-        return set()
-    last = max(range(1, len(poses)), key=speed)
-    return {last - 1, last}

@@ -10,14 +10,10 @@ from typing import TYPE_CHECKING
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.circumstances import PictureSizes
 from gelslim_twin.effects.dot_contrast import shift_px
+from gelslim_twin.planning.grey_sizes import effects_to_draw, left_by_bounds
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.planning.planner import Question, make_plan
-from gelslim_twin.planning.probing import (
-    LEAST_PICTURES,
-    effects_to_draw,
-    most_pictures,
-    picture_ms,
-)
+from gelslim_twin.planning.planner import Question, are_left_out, make_plan, with_effects
+from gelslim_twin.planning.probing import LEAST_PICTURES, most_pictures, picture_ms
 from gelslim_twin.simulation.picture_probe import PictureProbe
 
 if TYPE_CHECKING:
@@ -45,6 +41,7 @@ def drawn_effects(
         The question, in which the declared time of the pictures counts.
     """
     plan = make_plan(asked)
+    plan = with_effects(asked, plan, left_by_bounds(asked, plan))
     names = effects_to_draw(asked, plan)
     touches = asked.circumstances.motion.depth_mm > 0
     most = most_pictures(asked, by_bounds if touches else plan, solved if touches else ())
@@ -52,14 +49,13 @@ def drawn_effects(
         return asked
     shown = partial(shift_px, asked.circumstances)
     probe = PictureProbe(plan, viewer, shown)
-    found = probe.together(state, names, most, partial(_left_out, asked))
+    found = probe.together(state, names, most, partial(_fits, asked), asked.image_px)
     return with_pictures(asked, found, found.pictures * picture_ms(asked, plan))
 
 
-def _left_out(asked: Question, seen: PictureSizes) -> frozenset[str]:
-    """The effects that a plan leaves out which knows these sizes."""
-    known = with_pictures(asked, seen, 0.0)
-    return frozenset(c.effect for c in make_plan(known).choices if not c.included)
+def _fits(asked: Question, seen: PictureSizes) -> bool:
+    """Whether a plan that knows these sizes may leave out what was left out together."""
+    return are_left_out(with_pictures(asked, seen, 0.0))
 
 
 def with_pictures(asked: Question, seen: PictureSizes, milliseconds: float) -> Question:

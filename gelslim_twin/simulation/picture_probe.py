@@ -1,14 +1,16 @@
 """The probe of the picture: one pose drawn with and without effects on its grey values.
 
 A picture is evaluated by its dots, so that the size of effects is the largest shift of a dot that
-the force pipeline's detector finds, times a safety factor. All of them are left out at once, since
-two pictures then do for all. Where that shift is too large, spots and dirt are kept, then the
-quickest of the others, and what remains is left out. Where more than a few dots are found in one of
-two pictures only, the effects decide more than a shift, and their bounds stay.
+the force pipeline's detector finds, times a safety factor. Effects are left out together, so that
+two pictures tell about several of them. The first set to be left out are those that usual shares of
+their bounds suggest; it shrinks where its shift is too large, and grows as long as it is not. Where
+more than a few dots are found in one of two pictures only, the effects decide more than a shift,
+and their bounds stay.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,34 +26,29 @@ from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.circumstances import PictureSizes
 from gelslim_twin.effects.effect import Bound, picture, rounded_up
 from gelslim_twin.effects.grey_values import PIXEL_STEPS
+from gelslim_twin.planning.grey_sizes import (
+    FLOOR_PX,
+    SHADING,
+    is_finely_shaded,
+    least_light_px,
+    picture_safety,
+    usual_px,
+)
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.planning.probing import FLOOR_PX, SHADING
 
 if TYPE_CHECKING:
     from gelslim_twin.render.frame_renderer import RenderedFrame
     from gelslim_twin.simulation.picture import Viewer
 
-SAFETY = 1.6
-"""Factor on the largest shift of a dot at the pose that is drawn, for the other poses and for the
-noise of other frames, beside the addition of `FLOOR_PX`. In 50 random scenes 1.22 was needed: the
-largest of many normal deviations hardly grows with their number."""
-BLEMISHED_SAFETY = {"specular": 2.0, "dirt": 4.0}
-"""The same where these stay in the picture: the detector may find a dot beside them at two places,
-at some poses only. In these scenes 1.49 was needed beside spots, and 3.55 beside dirt."""
 RUNG_SAFETY = 3.0
-"""The same for the coarsest rung of shading."""
+"""The same as `picture_safety` for the coarsest rung of shading."""
 PICTURE_DIGITS = 2
 """Significant digits of what is found: one pixel that is rounded otherwise moves a dot."""
 LIGHT_SAFETY, LIT = 2.0, 0.05
 """Factor on the change of the light at the pose that is drawn, and the share of the usual light
 below which a pixel does not count."""
-SURELY, LEAST_PX = 25.0, 0.01
-"""Ratio of the bound of shading to the least size that it may have, and that size in any scene:
-with a tighter tolerance its light is not computed. In 9 of 10 random scenes the ratio was less."""
-FINELY, LEAST_FINE_PX = 5.0, 0.2
-"""The same where its light takes a fine lattice, which seldom pays."""
-KEPT_AT_ONCE = 2
-"""Effects that are kept more where all were too much, once spots and dirt are kept."""
+WORTH_A_TRY = 3.0
+"""Usual size over the tolerance up to which leaving an effect out is tried."""
 LIGHT_PICTURES = 1
 """Pictures that the light with and without shading counts for, on the coarsest lattice."""
 FINE_STEP, FINE_PICTURES = 2, 2
@@ -90,7 +87,8 @@ class PictureProbe:
         state: GelState,
         effects: Sequence[str],
         most_pictures: int,
-        leaves_out: Callable[[PictureSizes], frozenset[str]],
+        fits: Callable[[PictureSizes], bool],
+        tolerance_px: float = math.inf,
     ) -> PictureSizes:
         """What a state shows of leaving out as many of the effects at once as a plan allows.
 
@@ -98,7 +96,8 @@ class PictureProbe:
             state: The pose that is drawn.
             effects: The effects that may be left out.
             most_pictures: How many pictures may be drawn.
-            leaves_out: The effects that a plan leaves out which knows these sizes.
+            fits: Whether a plan that knows these sizes may leave out what was left out together.
+            tolerance_px: Of the picture, by which the first set is guessed.
 
         Returns:
             The effects to leave out together, and what else was found on the way.
@@ -110,27 +109,40 @@ class PictureProbe:
             if self._may_size_rung and self._may_draw(1 + FINE_PICTURES, most_pictures):
                 found = replace(found, coarsest=self._coarsest(state))
             more = 2 + LIGHT_PICTURES * (FINE_PICTURES if self._is_fine else 1)
-            promising = _jointly(found, self._least_light_px, [SHADING])
-            if SHADING in leaves_out(promising) and self._may_draw(more, most_pictures):
+            promising = _jointly(found, least_light_px(self.plan), [SHADING])
+            if fits(promising) and self._may_draw(more, most_pictures):
                 light_px = self._light_px(state)
-                if SHADING in leaves_out(_jointly(found, light_px, [SHADING])):
+                if fits(_jointly(found, light_px, [SHADING])):
                     names = [*effects]
-        # The quickest effects are kept first, since they cost least.
-        names.sort(key=lambda name: self.plan.choice(name).predicted_ms)
-        while names and self._may_draw(1 if self._kept else 2, most_pictures):
-            px = self.size_px(state, names, light_px)
-            joint = found if px is None else _jointly(found, px, names)
-            if joint.together and {*names} <= leaves_out(joint):
-                return replace(joint, pictures=self.pictures)
-            even = [name for name in names if name not in BLEMISHED_SAFETY]
-            names = even if len(even) < len(names) else names[KEPT_AT_ONCE:]
-        return replace(found, pictures=self.pictures)
+        names.sort(key=self._usual_px)
+        names = [n for n in names if self._usual_px(n) <= WORTH_A_TRY * tolerance_px]
+        best, count, grows = found, self._guessed(names, tolerance_px), True
+        while 0 < count <= len(names) and self._may_draw(1 if self._kept else 2, most_pictures):
+            some = names[:count]
+            px = self.size_px(state, some, light_px)
+            joint = found if px is None else _jointly(found, px, some)
+            if joint.together and fits(joint):
+                best = joint
+                if not grows:
+                    break
+                count += 1
+            elif best.together:
+                break
+            else:
+                grows, count = False, count - 1
+        return replace(best, pictures=self.pictures)
 
-    @property
-    def _least_light_px(self) -> float:
-        """What the light of shading changes at least."""
-        ratio, least_px = (FINELY, LEAST_FINE_PX) if self._is_fine else (SURELY, LEAST_PX)
-        return max(least_px, self.plan.choice(SHADING).size.image_px / ratio)
+    def _usual_px(self, effect: str) -> float:
+        return usual_px(self.plan, effect)
+
+    def _guessed(self, names: Sequence[str], tolerance_px: float) -> int:
+        """How many effects, the smallest first, are guessed to keep the tolerance together."""
+        for count in range(len(names), 1, -1):
+            some = names[:count]
+            usual_px = math.hypot(*map(self._usual_px, some))
+            if picture_safety(self.plan, some) * usual_px <= tolerance_px:
+                return count
+        return 1
 
     @property
     def _may_size_rung(self) -> bool:
@@ -143,9 +155,7 @@ class PictureProbe:
 
     @property
     def _is_fine(self) -> bool:
-        """Whether the plan has shading by a finer rung than the coarsest."""
-        rungs = {plan.choice(SHADING).rung_parameters for plan in (self.plan, self._coarse)}
-        return len(rungs) > 1
+        return is_finely_shaded(self.plan)
 
     def size_px(
         self, state: GelState, effects: Sequence[str], least_px: float = 0.0
@@ -158,9 +168,7 @@ class PictureProbe:
         px = None if dots is None else dots.shift_px(self._drawn(state, NOT_DRAWN | {*effects}))
         if px is None:
             return None
-        stay = {*self.plan.order} - {*effects}
-        safety = max((f for name, f in BLEMISHED_SAFETY.items() if name in stay), default=SAFETY)
-        size = _with_safety(px, safety)
+        size = _with_safety(px, picture_safety(self.plan, effects))
         return max(size.image_px, least_px if SHADING in effects else 0.0)
 
     @property

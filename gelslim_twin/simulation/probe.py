@@ -36,7 +36,8 @@ from gelslim_twin.effects.effect import OBSERVABLES, Bound, geometry, picture, r
 from gelslim_twin.effects.grey_values import MotionBlurParameters
 from gelslim_twin.effects.large_strain import RIM_NODES, RIM_PLACES
 from gelslim_twin.planning.planner import Question
-from gelslim_twin.planning.probing import MOTION_BLUR, probed_poses
+from gelslim_twin.planning.probed_path import pressed_poses, probed_poses, straight_poses
+from gelslim_twin.planning.probing import MOTION_BLUR
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.tools.tool import Tool
@@ -52,9 +53,16 @@ FORCE_SAFETY, FRICTION_SAFETY, PLACES_SAFETY = 1.25, 2.0, 2.0
 """Factors on what is found of forces, for large strain and for friction, and of displacements.
 They cover the poses between: in 66 random scenes the size over the whole path was up to 1.18 times
 (forces, large strain), 1.8 times (forces, friction) and 1.8 times (displacements) what is found."""
-DOTS_SAFETY = 2.5
-"""Factor on the speed of the images of dots between these poses: 1.9 was needed in 110 scenes of
-the gallery and at random, and more where the smear was below a thousandth of a pixel."""
+STRAIGHT_FRICTION_SAFETY, STRAIGHT_PLACES_SAFETY = 1.3, 1.5
+"""The same in a straight press, whose hardest pose is the deepest: friction needed 1.17 there in 98
+of 102 random scenes, and places under large strain 1.38."""
+LEAST_FRICTION = 5e-3
+"""What friction changes at least in a straight press, over the largest resultant and displacement:
+where it changes little at the deepest pose, it may change more on the way."""
+DOTS_SAFETY, SMOOTH_DOTS_SAFETY = 3.3, 1.75
+"""Factors on the speed of the images of dots between these poses, and for straight presses by tools
+without walls. In 171 random scenes 3.0 was needed, where a wall lets go of the gel (seed 3209),
+and 1.57 without walls."""
 LEAST_OVERLAP = 0.7
 """Overlap of the tool with the nodes at the poses of a probe over that at any pose: below it, the
 sizes found say little about the path. In seed 2334 a wall that met two nodes at one pose and none
@@ -109,11 +117,11 @@ def probed(
     sizes = dict[str, Bound]()
     if "friction" in effects and (free := probe.frictionless(steps)):
         held = [step.state for step in steps]
-        sizes["friction"] = probe.largest(held, free, FRICTION_SAFETY)
+        sizes["friction"] = probe.friction(held, free)
     hard = probe.corrections(steps) if "nonlinearity" in effects else []
     if hard:
         linear, strained = zip(*hard, strict=True)
-        sizes["nonlinearity"] = probe.largest(linear, strained)
+        sizes["nonlinearity"] = probe.large_strain(linear, strained)
         if asked.circumstances.has_sliding_walls:
             rim = probe.rim(linear)
             sizes["nonlinearity"] = sizes["nonlinearity"].plus(rim)
@@ -156,8 +164,10 @@ class _Probe:
         The two poses between which the tool is fastest are among them where that is asked for.
         """
         c = self.asked.circumstances
+        if c.motion.is_straight:
+            return pressed_poses(loaded.poses, straight_poses(c), with_fastest)
         reach_mm = c.footprint.reach_mm(c.contact.depth_mm) if with_fastest else None
-        return probed_poses(loaded.poses, c.motion.is_straight, reach_mm)
+        return probed_poses(loaded.poses, reach_mm)
 
     def are_hardest(self, poses: Sequence[Pose], path: Sequence[Pose]) -> bool:
         """Whether the tool overlaps the nodes at some of these poses about as much as anywhere.
@@ -240,18 +250,16 @@ class _Probe:
             )
             way_px = float(np.linalg.norm(px - before_px, axis=1).max(initial=0.0))
             speeds_px.append(way_px / (other.pose.time_s - one.pose.time_s))
-        return rounded_up(DOTS_SAFETY * max(speeds_px) / self.asked.circumstances.sensor.px_per_mm)
+        c = self.asked.circumstances
+        smooth = c.motion.is_straight and not c.has_walls
+        safety = SMOOTH_DOTS_SAFETY if smooth else DOTS_SAFETY
+        return rounded_up(safety * max(speeds_px) / c.sensor.px_per_mm)
 
     def smear(self, dot_mm_s: float) -> Bound:
         """Size of motion blur at a speed of the dots: how far a smeared dot lags behind."""
         c = self.asked.circumstances
         open_s = c.given(MOTION_BLUR, MotionBlurParameters).shutter_ms / 1000
         return picture(rounded_up(dot_mm_s * open_s * c.sensor.px_per_mm / 2))
-
-    @property
-    def depth_mm(self) -> float:
-        """Of the deepest contact."""
-        return self.asked.circumstances.motion.depth_mm
 
     def rim(self, states: Iterable[GelState]) -> Bound:
         """What nodes at the walls of the tool may differ by besides."""
@@ -260,7 +268,8 @@ class _Probe:
             for s in states
             if (touched := int((s.touch > 0).sum()))
         ]
-        px = RIM_PLACES * self.depth_mm * self.asked.circumstances.sensor.px_per_mm
+        c = self.asked.circumstances
+        px = RIM_PLACES * c.motion.depth_mm * c.sensor.px_per_mm
         return geometry(rounded_up(px), rounded_up(max(shares, default=0.0)))
 
     @cached_property
@@ -271,19 +280,42 @@ class _Probe:
             return None
         return marker_to_node(bundle.mesh.surface_mm, bundle.markers.positions_mm)
 
+    def friction(self, held: Sequence[GelState], free: Sequence[GelState]) -> Bound:
+        """Size of friction, from states with and without it."""
+        if not self.asked.circumstances.motion.is_straight:
+            return self.largest(held, free, (FRICTION_SAFETY, PLACES_SAFETY))
+        safety = STRAIGHT_FRICTION_SAFETY
+        scale = self.asked.circumstances.sensor.px_per_mm
+        whole_n = max(float(np.linalg.norm(state.force_n.sum(axis=0))) for state in held)
+        whole_px = scale * max(float(np.abs(state.displacement_mm).max()) for state in held)
+        least = geometry(LEAST_FRICTION * whole_px, LEAST_FRICTION * whole_n)
+        return self.largest(held, free, (safety, safety), least)
+
+    def large_strain(self, linear: Sequence[GelState], strained: Sequence[GelState]) -> Bound:
+        """Size of large strain, from states on a linear gel and corrected ones."""
+        straight = self.asked.circumstances.motion.is_straight
+        places = STRAIGHT_PLACES_SAFETY if straight else PLACES_SAFETY
+        return self.largest(linear, strained, (FORCE_SAFETY, places))
+
     def largest(
         self,
         ones: Iterable[GelState],
         others: Iterable[GelState],
-        force_safety: float = FORCE_SAFETY,
+        safety: tuple[float, float],
+        least: Bound | None = None,
     ) -> Bound:
-        """Largest differences of states in pairs, with the safety factors."""
+        """Largest differences of states in pairs, with safety factors of forces and of places.
+
+        `least` is added.
+        """
         found = Bound()
         for one, other in zip(ones, others, strict=True):
             found = found.at_least(self.difference(one, other))
+        force_safety, places_safety = safety
         px = (found.displacement_px, found.markers_px, found.image_px)
-        values = (found.force_n * force_safety, *(p * PLACES_SAFETY for p in px))
-        return Bound(*(rounded_up(value) for value in values))
+        sized = Bound(found.force_n * force_safety, *(p * places_safety for p in px))
+        sized = sized if least is None else sized.plus(least)
+        return Bound.by_observable({o: rounded_up(sized.of(o)) for o in OBSERVABLES})
 
     def difference(self, one: GelState, other: GelState) -> Bound:
         """What two states differ by."""

@@ -9,9 +9,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gelslim_twin.planning.grey_sizes import PICTURED
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import Question
-from gelslim_twin.planning.probing import PICTURED, effects_to_probe, probe_ms
+from gelslim_twin.planning.probing import effects_to_probe, probe_ms
 from gelslim_twin.planning.question import (
     bundle_figures,
     plan_asked,

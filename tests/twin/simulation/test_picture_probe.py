@@ -19,14 +19,13 @@ from gelslim_twin.effects.dot_contrast import shift_px
 from gelslim_twin.effects.effect import OBSERVABLES, rounded_up
 from gelslim_twin.effects.grey_values import MotionBlurParameters, smear_px
 from gelslim_twin.effects.large_strain import convergence_ms
+from gelslim_twin.planning.grey_sizes import PICTURED, SHADING
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.probing import (
     MOST_SHARE,
     MOTION_BLUR,
     PAYING_SHARE,
-    PICTURED,
-    SHADING,
     effects_to_probe,
     probe_ms,
 )
@@ -216,10 +215,10 @@ def test_the_force_that_relaxes_and_the_speed_of_dots_hold_on_the_path(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2032, 2040, 2122, 2134, 2140, 2160])
+@pytest.mark.parametrize("seed", [2032, 2040, 2079, 2122, 2134, 2140, 2160])
 def test_dots_are_smeared_by_no_more_than_tool_and_probe_say(tmp_path: Path, seed: int) -> None:
-    """In 2122 dots are 1.1 times as fast as the tool; in 2032 and 2140 they are 1.9 times as fast
-    as at the poses of a probe."""
+    """In 2122 dots are 1.1 times as fast as the tool, and in 2079, where the gel flows aside, 2.2
+    times; in 2032 and 2140 they are 1.9 times as fast as at the poses of a probe."""
     one = long_trial(seed, tmp_path)
     asked = replace(one.asked, observe=OBSERVABLES)
     found = probed(asked, one.loaded, one.compliance, (MOTION_BLUR,))

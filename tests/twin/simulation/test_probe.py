@@ -20,7 +20,13 @@ from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.effects.large_strain import convergence_ms
 from gelslim_twin.planning.planner import make_plan
-from gelslim_twin.planning.probing import MOST_POSES, MOST_SHARE, effects_to_probe, probed_poses
+from gelslim_twin.planning.probed_path import (
+    MOST_POSES,
+    STRAIGHT_POSES,
+    pressed_poses,
+    probed_poses,
+)
+from gelslim_twin.planning.probing import MOST_SHARE, effects_to_probe
 from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
@@ -121,6 +127,22 @@ def test_the_poses_of_a_probe_hold_the_extremes_of_the_path() -> None:
     assert probed_poses(path[:3]) == path[:3]
 
 
+def test_the_poses_of_a_press_are_in_contact_and_differ() -> None:
+    """Of a tool that is held, the last pose; none in the air, but for the fastest two."""
+    depths = [-1.0, 0.0, 0.2, 0.4, 0.6, 0.8, 0.8, 0.8, 0.5, 0.1, -0.2, -0.2]
+    path = tuple(Pose(float(k), depth_mm=d) for k, d in enumerate(depths))
+    kept = pressed_poses(path, STRAIGHT_POSES)
+    assert len(kept) == STRAIGHT_POSES
+    assert path[7] in kept
+    assert path[9] in kept
+    assert all(pose.depth_mm > 0 for pose in kept)
+    every = pressed_poses(path, 20)
+    assert every == tuple(path[k] for k in (2, 3, 4, 7, 8, 9))
+    fast = replace(path[10], time_s=9.01), replace(path[11], time_s=20.0)
+    with_fastest = pressed_poses((*path[:10], *fast), STRAIGHT_POSES, with_fastest=True)
+    assert {path[9], fast[0]} <= {*with_fastest}
+
+
 def test_a_pin_has_the_force_it_was_solved_to_have(folder: Path) -> None:
     """The height map of a pin of 0.4 mm radius holds a node or none; the estimate errs by far."""
     loaded = scene(folder, 0.01, "shape: sphere, radius_mm: 6", "shape: flat_punch, radius_mm: 0.4")
@@ -197,7 +219,7 @@ def test_the_corrected_pose_is_that_of_a_path_that_is_corrected_once(folder: Pat
     (pose,) = found.corrected
     tool = Tool.of(loaded.scene.indenters, loaded.folder, 0)
     solver = ContactSolver(pad, tool, ContactSettings(1e-5, 0.5))
-    path = probed_poses(loaded.poses, is_straight=True)
+    path = pressed_poses(loaded.poses, STRAIGHT_POSES)
     *_, last, linear = solver.states(path)
     law = FiniteStrainForce(pad.bundle, tolerance=1e-4)
     lost_n = law.force(linear.displacement_mm) - linear.force_n
@@ -265,6 +287,28 @@ def test_what_a_probe_finds_covers_the_whole_path(tmp_path: Path, seed: int) -> 
             moved = np.linalg.norm(a.displacement_mm - b.displacement_mm, axis=1).max()
             assert force <= bound.force_n + 1e-3 * found.resultant_n, name
             assert scale * moved <= bound.displacement_px + 0.05, name
+
+
+@pytest.mark.parametrize("seed", [3137, pytest.param(3077, marks=pytest.mark.slow)])
+def test_what_friction_adds_at_any_pose_of_a_press_is_found(tmp_path: Path, seed: int) -> None:
+    """In 3137 friction holds the tool at a single pose on its way out, by ten times what it adds at
+    the deepest; in 3077 it adds a hundredth, most of it on the way."""
+    one = Trial.of(*long_scene(seed), tmp_path)
+    asked = replace(one.asked, observe=("force", "displacement"))
+    found = probed(asked, one.loaded, one.compliance, ("friction",)).circumstances.probed
+    assert found is not None
+    tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
+    held, free = (
+        ContactSolver(one.compliance, tool, ContactSettings(1e-3, mu)).states(one.poses)
+        for mu in (asked.circumstances.friction, 0.0)
+    )
+    scale, most_n, most_px = asked.circumstances.sensor.px_per_mm, 0.0, 0.0
+    for a, b in zip(held, free, strict=True):
+        most_n = max(most_n, float(np.linalg.norm((a.force_n - b.force_n).sum(axis=0))))
+        moved = np.linalg.norm(a.displacement_mm - b.displacement_mm, axis=1).max()
+        most_px = max(most_px, scale * float(moved))
+    assert 0.2 * found.sizes["friction"].force_n < most_n <= found.sizes["friction"].force_n
+    assert most_px <= found.sizes["friction"].displacement_px
 
 
 def without_compression(one: Trial) -> Trial:
