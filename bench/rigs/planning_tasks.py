@@ -11,8 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bench.rigs.kept_runs import KeptRun, KeptRuns
 from bench.rigs.planning_cases import Case, Run, measured, prepared
-from bench.rigs.twin_rig import SCENES, plan_key
+from bench.rigs.twin_rig import SCENES, mechanics_key, plan_key
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.sensor import stored_sensor
@@ -34,12 +35,20 @@ class Task:
         scene: Name of a file of `designs/scenes` without its ending; empty for a random scene.
         seed: Of a random scene.
         sensor: Folder of the stored sensor of the gallery, which is copied.
+        runs: Folder that keeps everything on for later calls; None for none.
     """
 
     place: str
     scene: str = ""
     seed: int = 0
     sensor: str = ""
+    runs: str | None = None
+
+    @property
+    def kept(self) -> KeptRuns:
+        """Everything on, as a folder keeps it."""
+        folder = None if self.runs is None else Path(self.runs)
+        return KeptRuns(folder, self.scene or f"seed {self.seed}")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -77,8 +86,8 @@ def of_gallery(task: Task, folder: Path) -> Rows:
         try:
             if not carried:
                 prepared(case)
-            at = case if level is None else relative(case, carried, level)
-            row = measured(at, level, everything(at, carried))
+            at = case if level is None else relative(case, carried, task.kept, level)
+            row = measured(at, level, everything(at, carried, task.kept))
         except ContactError as error:
             row = {"level": level, "refused": str(error)}
         rows[f"{task.scene} {name}"] = {"scene": task.scene, **row}
@@ -93,24 +102,34 @@ def at_random(task: Task, folder: Path) -> Rows:
     try:
         case = Case.of_seed(task.seed, folder)
         prepared(case)
-        at = relative(case, carried, level)
-        row = measured(at, level, everything(at, carried))
+        at = relative(case, carried, task.kept, level)
+        row = measured(at, level, everything(at, carried, task.kept))
     except ContactError as error:
         row = {"level": level, "refused": str(error)}
     return {f"seed {task.seed}": {"seed": task.seed, **row}}
 
 
-def everything(case: Case, carried: dict[str, Run]) -> Run:
+def everything(case: Case, carried: dict[str, Run], kept: KeptRuns) -> Run:
     """Everything on, carried out once for equal rungs."""
-    key = plan_key(case.whole)
+    plan = case.whole
+    key = plan_key(plan)
     if key not in carried:
-        carried[key] = case.run(case.whole)
+        known = kept.read(key)
+        if known is None:
+            run = case.run(plan)
+            kept.keep(key, KeptRun(run.outcome.states, run.gel_ms, run.frames_ms))
+        else:
+            outcome = case.trial.carried_out(plan, known.states)
+            run = Run(outcome, known.gel_ms, known.frames_ms)
+            case.kept[mechanics_key(plan)] = known.states
+            case.draw_once(run.outcome)
+        carried[key] = run
     return carried[key]
 
 
-def relative(case: Case, carried: dict[str, Run], level: float) -> Case:
+def relative(case: Case, carried: dict[str, Run], kept: KeptRuns, level: float) -> Case:
     """The case with a tolerance relative to its largest force and to its depth in pixels."""
-    states = everything(case, carried).outcome.states
+    states = everything(case, carried, kept).outcome.states
     force = max(float((s.force_n.sum(axis=0) ** 2).sum() ** 0.5) for s in states)
     c = case.trial.asked.circumstances
     depth_px = c.motion.depth_mm * c.sensor.px_per_mm

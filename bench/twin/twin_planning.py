@@ -52,6 +52,11 @@ def main() -> None:
     parser.add_argument(
         "--sensor", type=Path, help="folder that keeps the sensor of the gallery for a later call"
     )
+    parser.add_argument(
+        "--runs",
+        type=Path,
+        help="folder that keeps everything on, solved and timed, for later",
+    )
     options = parser.parse_args()
     docs = options.docs or (None if options.quick else DOCS)
     if options.draw:
@@ -78,15 +83,16 @@ def main() -> None:
 def asked(options: argparse.Namespace, place: str, done: dict[str, Any]) -> list[Task]:
     """The tasks of a call, those of the gallery first because they take longest."""
     sensor = str(options.sensor or Path(place) / "sensor")
+    runs = None if options.runs is None else str(options.runs)
     scenes = options.scene or sorted(path.stem for path in SCENES.glob("*.yaml"))
     seeds = range(*options.seeds) if options.seeds else SEEDS
     if options.quick:
         scenes, seeds = options.scene or QUICK, (options.seeds and seeds) or list(seeds)[:4]
     every = []
     if options.scene or not options.seeds:
-        every += [Task(place, scene=name, sensor=sensor) for name in scenes]
+        every += [Task(place, scene=name, sensor=sensor, runs=runs) for name in scenes]
     if options.seeds or not options.scene:
-        every += [Task(place, seed=seed, sensor=sensor) for seed in seeds]
+        every += [Task(place, seed=seed, sensor=sensor, runs=runs) for seed in seeds]
     if options.scene or options.seeds:
         return every
     return [task for task in every if not all(name in done for name in task.names)]
