@@ -30,7 +30,7 @@ class BuiltGel:
     Attributes:
         bundle: The sensor.
         calibration: Its camera and markers, for this bundle.
-        share: What the uncertain gel adds to the covariance; None where nothing is known of it.
+        share: What gel and law add to the covariance; None for nothing.
         more: The same sensor with more of a parameter of its gel, and how much more.
     """
 
@@ -76,7 +76,7 @@ def built_gel(
     if gel is None:
         found = specified_gel(bundle)
         if found is None:
-            return BuiltGel(bundle, calibration)
+            return BuiltGel(bundle, calibration, GelShare.of_law(bundle, law))
     else:
         found = gel if isinstance(gel, GelCalibration) else read_gel_calibration(gel)
         made, moved = found.applied(bundle, calibration)

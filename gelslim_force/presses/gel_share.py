@@ -113,6 +113,13 @@ class GelShare:
         whole = np.reshape(derivative, shape)
         return cls(covariance, by_normal, whole, designed_thickness_mm(bundle), law == "linear")
 
+    @classmethod
+    def of_law(cls, bundle: Bundle, law: str) -> GelShare:
+        """The share of the law alone, for a gel whose modulus, thickness and ratio are known."""
+        nodes = len(bundle.mesh.surface)
+        nothing = np.zeros((1, 1)), np.zeros((6, nodes)), np.zeros((0, 6, nodes, 3))
+        return cls(*nothing, designed_thickness_mm(bundle), law == "linear")
+
     def added(
         self,
         wrench: Wrench,

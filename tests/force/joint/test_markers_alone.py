@@ -13,6 +13,7 @@ from pressed_samples import calibration, lit_bundle, pressed, reference
 from shaded_frames import shaded
 
 from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.wrench import WrenchNoise
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.pipeline import ForcePipeline
@@ -100,9 +101,20 @@ def test_a_force_that_the_markers_hardly_show_is_unknown() -> None:
     assert "standard deviation" in found.problems[-1]
 
 
-def test_a_gel_without_tolerances_changes_no_deviation() -> None:
-    source = mono().normal
-    assert mono().gel is None
+def test_a_gel_without_tolerances_adds_the_doubt_of_its_law_alone() -> None:
+    pipeline = mono()
+    source, share = pipeline.normal, pipeline.gel
+    assert share is not None
+    points = np.asarray(lit_bundle().mesh.surface_mm)
+    force = np.zeros((len(points), 3))
+    force[len(points) // 2] = [0.1, 0.0, -0.4]
+    wrench = WrenchNoise(points, np.zeros((6, len(points), 3))).wrench(force, np.zeros((6, 6)))
+    motion = np.zeros((len(points), 3))
+    assert share.added(wrench, motion).standard_deviation[2] == 0
+    motion[0, 2] = -0.2 * share.thickness_mm
+    doubt = share.added(wrench, motion).standard_deviation
+    assert doubt[2] == pytest.approx(0.15 * 0.11 * 0.4)
+    assert doubt[0] == pytest.approx(0.15 * 0.11 * 0.1)
     assert isinstance(source, UnknownShape)
     assert source.estimator.off_design is not None
     assert source.estimator.off_design.gel is None
