@@ -228,6 +228,8 @@ class Trial:
                     indenter="unknown",
                     settings=PipelineSettings(gel=law),  # type: ignore[arg-type]
                 )
+            if contact.law == "linear":
+                opened[key].gel = None  # What a linear law leaves out is nothing here.
             opened[key].process(rest)
             frames = self.kept / FRAMES[contact.law]
             result = opened[key].process(read_reference(frames / f"{2 * number + 1:03}.png"))

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 SHORT = {
-    "any object": "any object, from light and markers",
-    "any object, on nodes": "the same with `--no-finer-pressure`",
-    "any object, gel auto": "the same with `--gel auto`, a contact of a quarter of the thickness",
-    "depth given, 25%": "depth given",
+    "any object, gel auto": "any object, from light and markers, to a quarter of the thickness",
+    "any object": "the same with `--gel linear`, or less than a tenth of the thickness deep",
+    "any object, on nodes": "the same, and with `--no-finer-pressure`",
+    "depth given, gel auto": "depth given",
+    "depth given, 25%": "the same with `--gel linear --error 25%`",
     "tangential, 25%": "tangential forces alone (`--indenter none`)",
-    "sphere seen, 25%": "only the ball's size given, contact found in the picture",
+    "sphere seen, gel auto": "only the ball's size given, contact found in the picture",
     "paper's choices": "the paper's choices, with our detector",
 }
 CLOCKS = {"wall": "", "processor": "of the processor "}

@@ -47,4 +47,4 @@ def grey_pipeline() -> ForcePipeline:
     """Of the same sensor with a mono camera: forces of any object from the markers alone."""
     bundle = replace(lit_bundle(), camera={**lit_bundle().camera, "picture": "mono"})
     rest = np.rint(reference().image.mean(axis=2)).astype(np.uint8)
-    return open_sensor(bundle, reference=rest)
+    return open_sensor(bundle, reference=rest, settings=PipelineSettings(gel="linear"))

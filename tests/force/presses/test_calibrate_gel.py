@@ -26,6 +26,7 @@ from gelslim_force.presses.gel_report import gel_report_html
 from gelslim_force.presses.load_table import Load
 from gelslim_force.presses.press_error import PressError
 from gelslim_force.sensor import open_sensor
+from gelslim_force.settings import PipelineSettings
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def test_five_presses_find_a_hidden_gel_and_forces_follow() -> None:
     for gel in (None, found):
         sensor = open_sensor(
             ball_bundle(), reference=rest_picture(), calibration=ball_calibration(),
-            indenter="unknown", gel_calibration=gel,
+            indenter="unknown", gel_calibration=gel, settings=PipelineSettings(gel="linear"),
         )  # fmt: skip
         wrench = sensor.process(picture).wrench
         assert wrench is not None
@@ -185,7 +186,7 @@ def test_the_share_of_the_thickness_is_that_of_rebuilt_sensors(indenter: str) ->
         )  # fmt: skip
         sensor = open_sensor(
             bundle, reference=rest_picture(), calibration=ball_calibration(), indenter=indenter,
-            gel_calibration=gel,
+            gel_calibration=gel, settings=PipelineSettings(gel="linear"),
         )  # fmt: skip
         wrench = sensor.process(picture).wrench
         assert wrench is not None

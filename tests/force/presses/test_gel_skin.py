@@ -203,6 +203,7 @@ def test_a_hidden_skin_is_told_found_and_enters_the_forces(poissons_ratio: float
         sensor = open_sensor(
             ball_bundle(poissons_ratio), reference=rest_picture(),
             calibration=ball_calibration(), indenter="unknown", gel_calibration=gel,
+            settings=PipelineSettings(gel="linear"),
         )  # fmt: skip
         wrench = sensor.process(picture).wrench
         assert wrench is not None
