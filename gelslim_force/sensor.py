@@ -186,7 +186,9 @@ def normal_source(
     checked = (settings or PipelineSettings()).check_indenter
     if grey or not (checked and _shows_shapes(bundle, picture, grey)):
         return named
-    return CheckedIndenter(named, unknown_shape(bundle, calibration, picture, settings=WITNESS))
+    # The model of a named contact, with whose force it is compared, is linear.
+    witness = unknown_shape(bundle, calibration, picture, gel="linear", settings=WITNESS)
+    return CheckedIndenter(named, witness)
 
 
 def _is_grey(bundle: Bundle, picture: Picture | None) -> bool:

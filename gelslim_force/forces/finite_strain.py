@@ -197,9 +197,10 @@ class DepthLaw:
         return self.of(displacement_mm).force_n
 
     def of(self, displacement_mm: ArrayLike) -> LawForce:
-        """The same, with whether a deep contact has the forces of a linear gel.
+        """The same, with whether the forces of a deep contact are those of a linear gel.
 
-        It has where the motion is none that the gel can have: it inverts a cell of the mesh.
+        They are where the neo-Hookean law has none, because the motion inverts a cell of the mesh
+        or the inner nodes do not come to balance.
         """
         motion = np.asarray(displacement_mm, dtype=float)
         if -float(motion[:, 2].min(initial=0.0)) < self.from_mm:

@@ -53,7 +53,7 @@ def unknown_shape(
     calibration: Calibration,
     reference: NDArray[np.uint8] | None,
     *,
-    gel: str = "linear",
+    gel: str,
     settings: JointSettings | None = None,
     light: LightCalibration | None = None,
     more: Sequence[tuple[Bundle, float]] = (),

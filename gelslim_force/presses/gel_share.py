@@ -35,7 +35,7 @@ _DEPTHS, _LEFT_OUT = (0.0, 0.1, 0.2, 0.3, 0.5), (0.0, 0.03, 0.11, 0.20, 0.47)
 """Depth of a ball over the thickness, and the share of its force that a linear law leaves out."""
 _LAW_SIGMA = 0.15
 """Standard deviation of the force of a real gel from that of a neo-Hookean one, over what a linear
-law leaves out."""
+law leaves out. It is assumed: no press of a real gel was measured for it."""
 
 
 def varied_bundles(bundle: Bundle, gel: GelCalibration) -> list[tuple[Bundle, Bundle, float]]:

@@ -190,7 +190,7 @@ def test_a_pressed_sensor_gives_the_forces_of_its_pipeline() -> None:
     from gelslim_ros.force_server import ForceServer
 
     sent: dict[str, list[Any]] = {}
-    source = unknown_shape(lit_bundle(), calibration(), reference().image)
+    source = unknown_shape(lit_bundle(), calibration(), reference().image, gel="linear")
     server = ForceServer(
         ForcePipeline(lit_bundle(), calibration(), normal=source),
         lambda topic, fields: sent.setdefault(topic, []).append(fields),

@@ -104,7 +104,10 @@ def test_missing_files_and_other_sensors_are_refused(tmp_path: Path) -> None:
             indenter="sphere:5", light_calibration=built(),
         )  # fmt: skip
     with pytest.raises(ValueError, match="channels"):
-        unknown_shape(lit_bundle(), calibration(), reference().image, light=built(channels=(0, 2)))
+        unknown_shape(
+            lit_bundle(), calibration(), reference().image, gel="linear",
+            light=built(channels=(0, 2)),
+        )  # fmt: skip
 
 
 def test_gains_of_places_enter_the_law() -> None:

@@ -52,6 +52,14 @@ def apart(one: list[GelState], other: list[GelState]) -> tuple[float, float]:
     )
 
 
+def in_small_steps(seed: int, folder: Path) -> Trial:
+    """A random contact whose tool moves in four times as many steps."""
+    finger, values = random_contact(seed)
+    for move in values["motion"]["waypoints"]:
+        move["steps"] *= 4
+    return Trial.of(finger, values, folder)
+
+
 @pytest.mark.slow
 def test_the_tolerance_is_kept_with_fewer_corrections_the_looser_it_is(
     monkeypatch: pytest.MonkeyPatch,
@@ -183,10 +191,7 @@ def test_rungs_keep_what_one_correction_tells_of_them(tmp_path: Path, seed: int)
     and 3180 it moves aside. 3102 and later seeds were not looked at for the safety factors, but
     for 3238, in which 1.84 was needed.
     """
-    finger, values = random_contact(seed)
-    for move in values["motion"]["waypoints"]:
-        move["steps"] *= 4
-    one = Trial.of(finger, values, tmp_path)
+    one = in_small_steps(seed, tmp_path)
     asked = replace(one.asked, observe=("force", "displacement"))
     c = probed(asked, one.loaded, one.compliance, ("nonlinearity",)).circumstances
     tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
@@ -214,10 +219,7 @@ def test_rungs_keep_their_error_along_random_paths(tmp_path: Path, seed: int) ->
     not corrected, and walls hold other nodes at those before. In 2017, 2190 and 2217 nodes slip
     earlier or later, where friction drags them by up to ten times the depth.
     """
-    finger, values = random_contact(seed)
-    for move in values["motion"]["waypoints"]:
-        move["steps"] *= 4
-    one = Trial.of(finger, values, tmp_path)
+    one = in_small_steps(seed, tmp_path)
     tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
     c = probed(one.asked, one.loaded, one.compliance).circumstances
     settings = ContactSettings(1e-6, c.friction)
@@ -241,10 +243,7 @@ def test_rungs_keep_their_error_along_random_paths(tmp_path: Path, seed: int) ->
 def test_rungs_keep_what_a_probe_says_of_strained_contacts(tmp_path: Path, seed: int) -> None:
     """In 3209 and 3214 a wall holds a node otherwise at one pose of a deep press, at 3205 and 3231
     by less; in 3208 a ball that is pressed in by 39 % slides on a gel of ν = 0.47."""
-    finger, values = random_contact(seed)
-    for move in values["motion"]["waypoints"]:
-        move["steps"] *= 4
-    one = Trial.of(finger, values, tmp_path)
+    one = in_small_steps(seed, tmp_path)
     asked = replace(one.asked, observe=("force", "displacement"))
     c = probed(asked, one.loaded, one.compliance, ("nonlinearity",)).circumstances
     tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)

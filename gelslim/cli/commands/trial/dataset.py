@@ -137,7 +137,7 @@ def report(answer: dict[str, Any], seconds: float, as_json: bool) -> None:
         unit = "N" if observable == "force" else "px"
         print(
             f"gelslim: in {found['samples_over']} of {found['samples_judged']} samples drawn as a "
-            "trial the effects "
+            "trial, the effects "
             f"chosen may err by more in the {observable} than the tolerance of "
             f"{found['tolerance']:.3g} {unit}: {found['median']:.3g} {unit} in the median and "
             f"{found['largest']:.3g} {unit} in the worst, chiefly by "
