@@ -4,12 +4,14 @@
     python -m bench.force.force_sigma --processes 8
     python -m bench.force.force_sigma --deep       # the deep contacts only; the rest is kept
     python -m bench.force.force_sigma --wide       # only gels whose Poisson's ratio is hardly known
+    python -m bench.force.force_sigma --strong     # only errors of 200 presses of at least 0.2 N
     python -m bench.force.force_sigma --figure     # draw the figure from the data again
 
 Writes docs/data/force_sigma.json and docs/images/force_sigma.png. Contacts and the scores of each
 slice are kept in a folder, so that a run that was stopped goes on where it ended. The contacts are
 those of tests/force/sigma_cases.py; the deep ones, of a neo-Hookean gel, those of
-tests/force/deep_contacts.py.
+tests/force/deep_contacts.py. Of the others a quarter presses with 0.2 N or more, from which on
+relative errors count; as many presses as there are contacts are scored beside, all of which do.
 """
 
 from __future__ import annotations
@@ -50,6 +52,7 @@ def main() -> None:
     parser.add_argument("--kept", type=Path, default=KEPT, help="folder for contacts and slices")
     parser.add_argument("--deep", action="store_true", help="score the deep contacts only")
     parser.add_argument("--wide", action="store_true", help="score only the gels of that name")
+    parser.add_argument("--strong", action="store_true", help="score only presses of 0.2 N or more")
     parser.add_argument("--processes", type=int, default=1, help="that share the contacts")
     parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder like docs")
@@ -70,13 +73,16 @@ def measured(options: argparse.Namespace, stored: Path) -> dict[str, Any]:
     from sigma_gate import MODES, WIDE
 
     data: dict[str, Any] = {}
-    if options.deep or options.wide:
-        data = json.loads(stored.read_text("utf-8"))
-    else:
+    every = not (options.deep or options.wide or options.strong)
+    if every:
         data = {**machine(31), "cases": options.cases, "modes": scored(options, MODES)}
-    if options.wide or not options.deep:
+    else:
+        data = json.loads(stored.read_text("utf-8"))
+    if options.wide or every:
         data["wide"] = scored(options, (WIDE,))[WIDE]
-    if options.deep or not options.wide:
+    if options.strong or every:
+        data["strong"] = strong_scored(options)
+    if options.deep or every:
         data["deep"] = deep_scored(options.processes)
     return data
 
@@ -96,6 +102,15 @@ class DeepSlice:
 
     law: str
     seeds: range
+
+
+@dataclass(frozen=True)
+class StrongSlice:
+    """Presses of 0.2 N or more that one process scores by a gel, with the folder for contacts."""
+
+    gel: str
+    seeds: tuple[int, ...]
+    kept: Path
 
 
 def scored(options: argparse.Namespace, modes: tuple[str, ...]) -> dict[str, Any]:
@@ -141,10 +156,40 @@ def _path(some: Slice, mode: str) -> Path:
     return some.kept / f"{name}-{some.seeds.start}-{some.seeds.stop}.json"
 
 
+def strong_scored(options: argparse.Namespace) -> dict[str, Any]:
+    """Scores and relative errors of strong presses by what is known of the gel."""
+    from frame_errors import error_summary
+    from press_gate import GELS, press_seeds
+
+    options.kept.mkdir(parents=True, exist_ok=True)
+    seeds = press_seeds(options.cases)
+    slices = [
+        StrongSlice(gel, tuple(seeds[first : first + SLICE]), options.kept)
+        for gel in GELS
+        for first in range(0, len(seeds), SLICE)
+    ]
+    scores = dict(Engine(options.processes).run(score_strong_slice, slices))
+    found = {}
+    for gel in GELS:
+        some = [s for k, part in enumerate(slices) if part.gel == gel for s in scores[k]]
+        errors = {key: four_digits(value) for key, value in error_summary(some).items()}
+        found[gel] = {**recorded((vars(s.score) for s in some), ERRORS), "relative": errors}
+    return found
+
+
+def score_strong_slice(some: StrongSlice) -> tuple[Any, ...]:
+    """The scores of some strong presses."""
+    see_tests("force")
+    from press_gate import press_errors
+
+    return tuple(press_errors(some.gel, some.seeds, some.kept))
+
+
 def deep_scored(processes: int) -> dict[str, Any]:
     """Scores and relative errors of the deep contacts by law of the gel; nothing is given."""
     from deep_contacts import COUNT, SEEN
-    from deep_gate import LAWS, deep_summary
+    from deep_gate import LAWS
+    from frame_errors import error_summary
 
     slices = [
         DeepSlice(law, range(first, min(first + DEEP_SLICE, COUNT)))
@@ -158,7 +203,7 @@ def deep_scored(processes: int) -> dict[str, Any]:
         some = [score for part in own for score in part]
         parts = {"relative": some, "relative_held_out": some[SEEN:]}
         errors = {
-            name: {key: four_digits(value) for key, value in deep_summary(part).items()}
+            name: {key: four_digits(value) for key, value in error_summary(part).items()}
             for name, part in parts.items()
         }
         found[law] = {**recorded((vars(s.score) for s in some), ERRORS), **errors}
@@ -191,7 +236,37 @@ def table(record: Record) -> str:
         every = list(record["wide"].values())
         lines.append(_row("nothing given, Poisson's ratio ± 0.02, all", every))
     lines += [_row(f"nothing given, deep, gel {law}", [row]) for law, row in record["deep"].items()]
-    return "\n".join(lines)
+    return "\n".join([*lines, "", *_strong_table(record["strong"])])
+
+
+def _strong_table(rows: Record) -> list[str]:
+    """Relative errors of the strong presses."""
+    lines = [
+        "Presses with at least 0.2 N, nothing given, the conditions in turn. *Mean* is that of the "
+        "errors with their sign and its standard deviation; shear is relative to F_z, the field is "
+        "that of the nodal forces.",
+        "",
+        "| gel | presses | refused | F_z, median | 95th percentile | mean | shear | "
+        "centre of pressure | field | RMS of error/σ | within 1.96 σ |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for name, row in rows.items():
+        error, z = row["relative"], np.array(row["error_mn"]) / np.array(row["sigma_mn"])
+        cells = [
+            name,
+            f"{len(z) + row['refused']}",
+            f"{row['refused']}",
+            f"{100 * error['normal']:.1f} %",
+            f"{100 * error['normal_95']:.1f} %",
+            f"{100 * error['mean']:+.1f} ± {100 * error['mean_sigma']:.1f} %",
+            f"{100 * error['shear']:.1f} %",
+            f"{error['centre_mm']:.3f} mm",
+            f"{100 * error['field']:.0f} %",
+            _three(np.sqrt((z**2).mean(axis=0)), ".2f"),
+            _three(100 * (np.abs(z) < norm.ppf(0.975)).mean(axis=0), ".0f") + " %",
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
 
 
 def _row(name: str, conditions: list[Record]) -> str:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pressed_samples import lit_bundle, reference
 from sigma_cases import seen, specified_bundle
-from sigma_gate import Score, _kept
+from sigma_gate import Score, kept_contact
 
 from gelslim_force.built_sensor import built_gel
 from gelslim_force.calibration.calibration import calibrate
@@ -94,7 +94,7 @@ def scores(
     """
     pipeline, found = opened(rest), []
     for seed in seeds:
-        contact = _kept("nothing given", seed, stored)
+        contact = kept_contact("nothing given", seed, stored)
         pipeline.reset()
         result = pipeline.process(frames.of(seen(contact.picture, "quiet", seed)))
         true_n = tuple(contact.force_n.tolist())

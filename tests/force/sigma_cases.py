@@ -8,9 +8,10 @@ the slope of the deformed surface. The pipeline's mesh, laws and renderer have n
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import count
 
 import numpy as np
 from camera_rig import off_centre_view
@@ -119,30 +120,31 @@ def spread_normal(seed: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Load:
-    """Gel, gain of the light, and forces (n, 3) on the nodes of the finer pad."""
+class PressLoad:
+    """Gel, gain of the light, and forces (n, 3) on the nodes of the finer pad of `fine_pad`."""
 
     gel: MadeGel
     light_gain: float
     force_n: Array
 
 
-def _load(seed: int, wide: bool = False) -> _Load:
+def press_load(seed: int, wide: bool = False) -> PressLoad:
+    """What `press` puts on which gel, without drawing its picture."""
     rng = np.random.default_rng([31, seed])
     gel, gain = MadeGel.drawn(rng, seed if wide else None), float(np.exp(rng.normal(0, LIGHT_GAIN)))
     pad = fine_pad(gel.thickness, gel.poissons_ratio)
     size = np.exp(rng.uniform(np.log(0.4), np.log(1.3)))
-    return _Load(gel, gain, tractions(pad.points_mm, rng) * pad.cell_mm2 * size)
+    return PressLoad(gel, gain, tractions(pad.points_mm, rng) * pad.cell_mm2 * size)
 
 
-def press_force_n(seed: int) -> Array:
-    """(3,) force of `press`, without drawing its picture."""
-    return np.asarray(_load(seed).force_n.sum(axis=0))
+def strong_presses(first: int, least_n: float) -> Iterator[int]:
+    """Seeds from `first` on, without end, of presses whose normal force is at least `least_n`."""
+    return (s for s in count(first) if -press_load(s).force_n[:, 2].sum() >= least_n)
 
 
 def press(seed: int, wide: bool = False) -> Contact:
     """Random tractions on a gel as `MadeGel.drawn` gives it."""
-    load = _load(seed, wide)
+    load = press_load(seed, wide)
     gel, gain, force = load.gel, load.light_gain, load.force_n
     pad = fine_pad(gel.thickness, gel.poissons_ratio)
     moved = pad.operator.displacement(force / gel.young)

@@ -64,7 +64,8 @@ def _gel(wide: bool = False) -> BuiltGel:
 
 
 @cache
-def _nothing_given(wide: bool = False) -> ForcePipeline:
+def nothing_given(wide: bool = False) -> ForcePipeline:
+    """Forces by light and markers, on a gel as specified."""
     bundle, gel = specified_bundle(wide), _gel(wide)
     source = unknown_shape(
         bundle,
@@ -97,7 +98,7 @@ def score(mode: str, condition: str, seed: int, contact: Contact) -> Score:
     """Process one frame of a contact."""
     given: dict[str, Any] = {}
     if mode in ("nothing given", WIDE):
-        pipeline = _nothing_given(mode == WIDE)
+        pipeline = nothing_given(mode == WIDE)
     elif mode == "depth given":
         pipeline, given = _depth_given(), _given_depth(contact.height_mm, seed)
     else:
@@ -135,11 +136,12 @@ def scores(
     found: dict[str, list[Score]] = {condition: [] for condition in CONDITIONS}
     for seed in seeds:
         condition = condition_of(seed)
-        found[condition].append(score(mode, condition, seed, _kept(mode, seed, stored)))
+        found[condition].append(score(mode, condition, seed, kept_contact(mode, seed, stored)))
     return found
 
 
-def _kept(mode: str, seed: int, folder: Path | None) -> Contact:
+def kept_contact(mode: str, seed: int, folder: Path | None) -> Contact:
+    """The contact of a case, read from the folder or made and kept there, if one is given."""
     if folder is None:
         return contact_of(mode, seed)
     kind = {"ball given": "ball", WIDE: "wide"}.get(mode, "press")

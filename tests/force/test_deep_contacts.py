@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from camera_rig import off_centre_view
 from deep_contacts import COUNT, KINDS, SEEN, deep_case, deep_contact, finer_pad, solve
-from deep_gate import deep_scores, deep_summary
+from deep_gate import deep_scores
 from deep_pictures import Light
+from frame_errors import error_summary
 from numpy.typing import NDArray
 from sigma_gate import summaries
 from synthetic import centroids, grid_of_dots, moved_rims, outlines
@@ -81,7 +82,7 @@ def test_forces_at_large_strain(
     # One of the faint cones has dirt on a third of its markers.
     assert all(-score.true_n[2] < 0.05 for score in refused)
     for part in (some[:SEEN], some[SEEN:]):
-        reached = deep_summary(part)
+        reached = error_summary(part)
         assert reached["normal"] < normal
         assert reached["normal_95"] < normal_95
         assert reached["shear"] < shear
@@ -101,7 +102,7 @@ def test_forces_in_light_whose_directions_the_bundle_has_not(light: Light) -> No
     """
     some = deep_scores("auto", range(0, COUNT, 3), light)
     assert all(s.score.error_n for s in some), [s.score.problem for s in some]
-    reached = deep_summary(some)
+    reached = error_summary(some)
     assert reached["contacts"] == 16
     assert reached["normal"] < 0.05
     assert abs(reached["bias"]) < 0.05

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from press_gate import GELS
 from sigma_cases import CONDITIONS, spread_normal
 from sigma_gate import COVERAGE, MODES, RMS, Score, scores, summaries
 
@@ -83,6 +84,25 @@ def test_the_stored_scores_of_gels_that_are_hardly_known_keep_the_gate() -> None
     rms, inside = np.sqrt((z**2).mean(axis=0)), (np.abs(z) < 1.96).mean(axis=0)
     assert ((rms > RMS[0]) & (rms < RMS[1])).all()
     assert ((inside > COVERAGE[0]) & (inside < COVERAGE[1])).all()
+
+
+def test_the_stored_errors_of_strong_presses_are_small() -> None:
+    """Of presses of at least 0.2 N by light and markers alone; half were drawn after all weights."""
+    strong = json.loads(STORED.read_text("utf-8"))["strong"]
+    for gel, (normal, normal_95) in zip(GELS, [(0.03, 0.115), (0.025, 0.08)], strict=True):
+        row, reached = strong[gel], strong[gel]["relative"]
+        assert reached["contacts"] + row["refused"] >= 200
+        assert row["refused"] <= 2
+        assert reached["normal"] < normal
+        assert reached["normal_95"] < normal_95
+        assert abs(reached["mean"]) < 2 * reached["mean_sigma"]
+        assert reached["shear"] < 0.01
+        assert reached["centre_mm"] < 0.1
+        assert reached["field"] < 0.22
+        z = np.array(row["error_mn"]) / np.array(row["sigma_mn"])
+        rms, inside = np.sqrt((z**2).mean(axis=0)), (np.abs(z) < 1.96).mean(axis=0)
+        assert ((rms > 0.7) & (rms < RMS[1])).all()
+        assert (inside > COVERAGE[0]).all()
 
 
 def test_the_stored_scores_of_deep_contacts_hold() -> None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import count, islice
+from itertools import islice
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from pressed_samples import calibration
-from sigma_cases import press, press_force_n, seen, specified_bundle
+from sigma_cases import press, seen, specified_bundle, strong_presses
 from sigma_gate import COVERAGE, RMS, condition_of
 
 from gelslim_force.built_sensor import BuiltGel, built_gel
@@ -55,7 +55,7 @@ def test_forces_and_deviations_by_the_markers_off_design() -> None:
         gel().share,
     )
     off, sigma, true, unknown = [], [], [], 0
-    for seed in islice((s for s in count(FIRST) if -press_force_n(s)[2] >= LEAST_N), CASES):
+    for seed in islice(strong_presses(FIRST, LEAST_N), CASES):
         contact = press(seed)
         image = seen(contact.picture, condition_of(seed), seed)
         pipeline.reset()
