@@ -4,8 +4,8 @@ Light that changes for another reason than a contact, such as a shadow or dirt, 
 away from what the markers show. The markers in the contact then keep residuals. The covariance
 grows by their size, as that of a mean of values that do not agree (R. T. Birge, "The calculation of
 errors by the method of least squares", Phys. Rev. 40, 1932). It grows as well where the forces
-leave much of the change of the light unexplained, and where noise blurs the region that the markers
-alone show.
+leave much of the change of the light unexplained, where noise blurs the region that the markers
+alone show, and where a coarse picture may hide the fainter parts of a contact.
 """
 
 from __future__ import annotations
@@ -58,6 +58,23 @@ def with_misfit(
         noise_mm = noise_px * estimator.markers.usual_mm_per_px
         growth = max(growth, noise_mm / (_SHARP * estimator.settings.marker_mm))
     return found if growth <= 1 else replace(found, covariance=growth**2 * found.covariance)
+
+
+def with_hidden(estimator: JointEstimator, found: JointForces, normal_n: float) -> JointForces:
+    """The forces with a covariance that holds parts of the contact that the light does not show.
+
+    Args:
+        estimator: Which found them.
+        found: The forces.
+        normal_n: Standard deviation of the normal force that may be hidden, at the centre of
+            pressure.
+    """
+    push = -found.force_n[:, 2]
+    if normal_n <= 0 or not push.any():
+        return found
+    x, y, _ = push @ estimator.points_mm / push.sum()
+    hidden = normal_n * np.array([0.0, 0.0, 1.0, y, -x, 0.0])
+    return replace(found, covariance=found.covariance + np.outer(hidden, hidden))
 
 
 def marker_misfit(

@@ -15,7 +15,7 @@ from gelslim_force.contact.normal_source import FoundForces, NormalReading
 from gelslim_force.contact.shading_change import MOST_FAINT, TOO_FAINT, LostColourError
 from gelslim_force.joint.estimator import JointEstimator
 from gelslim_force.joint.fit_state import FrameData, JointForces
-from gelslim_force.joint.marker_misfit import with_misfit
+from gelslim_force.joint.marker_misfit import with_hidden, with_misfit
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.marker_noise import noise_px
 from ifem_export.errors import IfemError
@@ -71,10 +71,14 @@ class UnknownShape:
     @property
     def unseen_n(self) -> float:
         """Normal force that the light of the last frame may not show."""
+        return self._usually_unseen_n * self._faint
+
+    @property
+    def _usually_unseen_n(self) -> float:
         chosen = self.estimator.settings
         bare = self.estimator.light is None
         least = chosen.unseen_by_markers if bare else chosen.unseen_force
-        return least * self.estimator.youngs_modulus_mpa * self._faint
+        return least * self.estimator.youngs_modulus_mpa
 
     @property
     def most_gain(self) -> float:
@@ -101,8 +105,12 @@ class UnknownShape:
         except (IfemError, LostColourError) as error:
             return str(error)
         if found is None or self._explains(found):
-            self._last = found and with_misfit(self.estimator, found, markers_px, noise)
-            return self._last
+            if found is not None:
+                found = with_misfit(self.estimator, found, markers_px, noise)
+                more_n = self.unseen_n - self._usually_unseen_n
+                found = with_hidden(self.estimator, found, more_n)
+            self._last = found
+            return found
         return None if -found.force_n[:, 2].sum() < self.unseen_n else found
 
     def _estimate(self, frame: FrameData, last: JointForces | None = None) -> JointForces | None:

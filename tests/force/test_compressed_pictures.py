@@ -51,6 +51,16 @@ def test_deviations_hold_in_compressed_pictures(
         assert np.median(off) < 0.12
 
 
+@pytest.mark.slow
+def test_parts_of_a_contact_that_coarse_pictures_hide_are_in_the_deviation() -> None:
+    """53 mN were read as 29 with a deviation of 5.5, as the light shows the middle alone."""
+    (score,) = scores(Compression("JPEG", 40, "4:4:4"), NONE, [26])
+    assert score.error_n
+    assert score.true_n[2] == pytest.approx(-0.053, abs=1e-3)
+    assert score.error_n[2] > 0.015
+    assert score.error_n[2] < 2.5 * score.sigma_n[2]
+
+
 def test_the_stored_scores_of_compressed_pictures_hold() -> None:
     """What the table in the docs claims, from the scores themselves."""
     record = json.loads(STORED.read_text("utf-8"))

@@ -87,7 +87,7 @@ def test_the_stored_scores_of_gels_that_are_hardly_known_keep_the_gate() -> None
 
 
 def test_the_stored_errors_of_strong_presses_are_small() -> None:
-    """Of presses of at least 0.2 N by light and markers alone; half were drawn after all weights."""
+    """Of presses of at least 0.2 N by light and markers; half were drawn after all weights."""
     strong = json.loads(STORED.read_text("utf-8"))["strong"]
     for gel, (normal, normal_95) in zip(GELS, [(0.03, 0.115), (0.025, 0.08)], strict=True):
         row, reached = strong[gel], strong[gel]["relative"]
