@@ -97,6 +97,19 @@ class Bundle:
     skin: Skin | None = None
     imported: Imported | None = None
 
+    def __str__(self) -> str:
+        """The sensor in a line: pad, gel, markers and light."""
+        mesh, material, markers = self.mesh, self.material, self.markers
+        size_mm = " x ".join(f"{size:.3g}" for size in np.ptp(mesh.nodes_mm, axis=0))
+        return (
+            f"Bundle(pad of {size_mm} mm with {len(mesh.surface)} surface nodes, "
+            f"E = {material.youngs_modulus_mpa:.4g} MPa, ν = {material.poissons_ratio:.4g}, "
+            f"{0 if markers is None else len(markers.positions_mm)} markers, "
+            f"{'traced light' if self.light else 'no traced light'})"
+        )
+
+    __repr__ = __str__
+
     def surface_operator(
         self,
         rung: Rung | None = None,

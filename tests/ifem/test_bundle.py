@@ -100,6 +100,20 @@ def test_bad_parts_are_refused(paper_pad, gel, arguments, field):
     assert caught.value.to_dict()["field"] == field
 
 
+def test_a_bundle_shows_itself_in_a_line(paper_pad, gel):
+    bundle = build_bundle(paper_pad, gel, marker_positions_mm=MARKERS)
+    shown = str(bundle)
+    assert repr(bundle) == shown
+    assert "\n" not in shown
+    assert len(shown) < 160
+    for part in (
+        f"{len(paper_pad.surface)} surface nodes",
+        f"{len(MARKERS)} markers",
+        "no traced light",
+    ):
+        assert part in shown
+
+
 def test_geometry_hash_tells_pads_apart(paper_pad, gel):
     bundle = build_bundle(paper_pad, gel, "full", marker_positions_mm=MARKERS)
     softer = build_bundle(
