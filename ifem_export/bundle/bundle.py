@@ -19,6 +19,7 @@ from scipy import sparse
 from gelslim_core.budget.budget import Budget
 from ifem_export.assembly.assembly import mesh_stiffness
 from ifem_export.bundle.imported import Imported
+from ifem_export.bundle.self_test import SelfTest
 from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.elements.skin import Membrane, Skin
@@ -31,24 +32,9 @@ from ifem_export.operators.crowned_system import pad_system
 from ifem_export.operators.operator_ladder import OperatorLadder, chosen_rung
 from ifem_export.operators.surface_operator import Rung, SurfaceOperator, surface_operator
 
-_SELF_TEST_SEED = 20190521
-_SELF_TEST_AMPLITUDE = 0.1
 ELEMENT_TOLERANCE = 1e-12
 """Largest relative difference between the stored element matrix and that of the material."""
 _WITHOUT_ADJOINT = ("paper", "factor", "dense32")
-
-
-@dataclass(frozen=True, eq=False)
-class SelfTest:
-    """A displacement and its nodal forces F = K u, checked whenever the bundle is loaded.
-
-    Attributes:
-        displacement_mm: (n, 3).
-        force_n: (n, 3).
-    """
-
-    displacement_mm: NDArray[np.float64]
-    force_n: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +178,6 @@ class Bundle:
         """
         mesh = self.mesh.stretched(thickness_ratio)
         matrix = hex8_stiffness(mesh.cell_size_mm, material, self.formulation)
-        moved = np.asarray(self.self_test.displacement_mm)
         return replace(
             self,
             mesh=mesh,
@@ -200,7 +185,7 @@ class Bundle:
             element_matrix=matrix,
             stiffness=None,
             stored_adjoint=None,
-            self_test=SelfTest(moved, elementwise_force(mesh, matrix, moved)),
+            self_test=self.self_test.on(mesh, matrix),
         )
 
     @property
@@ -261,7 +246,6 @@ def build_bundle(
     """
     plain_camera = _plain_json(camera or {})
     matrix = hex8_stiffness(mesh.cell_size_mm, material, formulation)
-    displacement = _test_displacement(mesh)
     return Bundle(
         mesh=mesh,
         material=material,
@@ -270,7 +254,7 @@ def build_bundle(
         stiffness=mesh_stiffness(mesh, matrix) if with_stiffness else None,
         markers=marker_field(mesh, marker_positions_mm, marker_arrays),
         camera=plain_camera,
-        self_test=SelfTest(displacement, elementwise_force(mesh, matrix, displacement)),
+        self_test=SelfTest.drawn(mesh, matrix),
         spec_hash=spec_hash,
         ladder=ladder,
         operator=operator,
@@ -279,23 +263,6 @@ def build_bundle(
         light={name: np.asarray(values) for name, values in (light or {}).items()},
         skin=skin,
         imported=imported,
-    )
-
-
-def elementwise_force(
-    mesh: PadMesh, element_matrix: NDArray[np.float64], displacement_mm: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """F = K u (n, 3) in N summed over the elements: an independent check of the assembled K."""
-    per_element = displacement_mm[mesh.hexes].reshape(-1, 24) @ element_matrix
-    if mesh.fill is not None:
-        # Cells are numbered x fastest, z slowest.
-        cells = np.asarray(mesh.fill).transpose(2, 1, 0)
-        per_element *= cells[np.asarray(mesh.occupancy).transpose(2, 1, 0)][:, None]
-    nodes = np.asarray(mesh.hexes).reshape(-1)
-    components = per_element.reshape(-1, 3)
-    return np.stack(
-        [np.bincount(nodes, weights=components[:, i], minlength=mesh.n_nodes) for i in range(3)],
-        axis=1,
     )
 
 
@@ -329,14 +296,6 @@ def geometry_hash(mesh: PadMesh, markers: MarkerField | None) -> str:
 
 def _rounded(lengths_mm: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.rint(lengths_mm * 1e9).astype("<i8")
-
-
-def _test_displacement(mesh: PadMesh) -> NDArray[np.float64]:
-    """Fixed pseudo-random displacement (n, 3) of the free nodes, zero on the bonded nodes."""
-    rng = np.random.default_rng(_SELF_TEST_SEED)
-    u = rng.uniform(-_SELF_TEST_AMPLITUDE, _SELF_TEST_AMPLITUDE, (mesh.n_nodes, 3))
-    u[mesh.bonded] = 0.0
-    return u
 
 
 def _plain_json(camera: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ifem_export.assembly.assembly import corner_fill
-from ifem_export.bundle.bundle import ELEMENT_TOLERANCE, Bundle, elementwise_force
+from ifem_export.bundle.bundle import ELEMENT_TOLERANCE, Bundle
 from ifem_export.bundle.layout import bundle_arrays
 from ifem_export.bundle.manifest import REBUILD
+from ifem_export.bundle.self_test import elementwise_force
 from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.markers.field import MarkerField

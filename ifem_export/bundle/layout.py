@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ifem_export.bundle.bundle import Bundle, SelfTest
+from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.imported import Imported
 from ifem_export.bundle.manifest import ADJOINT_VERSION, MANIFEST, REBUILD
+from ifem_export.bundle.self_test import SelfTest
 from ifem_export.elements.material import Material
 from ifem_export.elements.skin import Skin
 from ifem_export.errors import BundleError, IfemError

@@ -101,7 +101,7 @@ def test_bad_parts_are_refused(paper_pad, gel, arguments, field):
 
 
 def test_a_bundle_shows_itself_in_a_line(paper_pad, gel):
-    bundle = build_bundle(paper_pad, gel, marker_positions_mm=MARKERS)
+    bundle = build_bundle(paper_pad, gel, "full", marker_positions_mm=MARKERS)
     shown = str(bundle)
     assert repr(bundle) == shown
     assert "\n" not in shown

@@ -7,7 +7,8 @@ import pytest
 from ifem_shapes import Polygon, Sphere, disc
 
 from ifem_export.assembly.assembly import assemble_csr, mesh_stiffness
-from ifem_export.bundle.bundle import elementwise_force, geometry_hash
+from ifem_export.bundle.bundle import geometry_hash
+from ifem_export.bundle.self_test import elementwise_force
 from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.errors import MeshError, OutlineError
