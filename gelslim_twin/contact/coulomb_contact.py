@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, lu_factor, lu_solve
 
 from gelslim_twin.contact.contact_forces import SLIP, ContactForces
-from gelslim_twin.contact.coulomb_kernel import answers, motion, sweep
+from gelslim_twin.contact.coulomb_kernel import answers, motion, sweeps
 from gelslim_twin.contact.gel_state import ContactError
 
 Array = NDArray[np.float64]
@@ -26,13 +26,6 @@ SURE = 0.1
 """Share of the tolerance at which Newton's method stops, as its steps do not estimate the error."""
 LEAST_RATE = 0.5
 """Least rate of convergence assumed for the sweeps."""
-
-
-def _left(changes: list[float], relaxation: float) -> float:
-    """Estimated error of the forces: remainder of a geometric series of the last changes."""
-    first, _, last = changes[-3], changes[-2], changes[-1]
-    rate = max(LEAST_RATE, (last / first) ** 0.5) if 0 < first < np.inf else LEAST_RATE
-    return last * (rate / (1 - rate) if rate < 1 else np.inf) / relaxation
 
 
 class FrictionalContact:
@@ -71,42 +64,40 @@ class FrictionalContact:
         beside = np.isinf(self.height)
         if f.reshape(-1, 3)[beside].any():
             f.reshape(-1, 3)[beside], start_mm = 0.0, None
-        best, sweeps, newton = np.inf, 0, 0
+        best, count, newton = np.inf, 0, 0
         known = None if start_mm is None else np.array(start_mm, dtype=float).reshape(-1)
         for relaxation in RELAXATIONS:
             u = self._motion(f) if known is None else known
-            known, last, changes = None, np.inf, [np.inf, np.inf]
-            for turn in range(MOST_SWEEPS):
-                change = sweep(
-                    self.c, self.own, self.frames, self.height, self.target, self.mu,
-                    relaxation, bool(turn % 2), f, u, self.touch,
+            known, last, changes = None, np.inf, np.full(3, np.inf)
+            turn = 0
+            while turn < MOST_SWEEPS:
+                done, near = sweeps(
+                    self.c, self.own, self.frames, self.height, self.target, self.mu, relaxation,
+                    turn, CHECK_EVERY - turn % CHECK_EVERY, tolerance, LEAST_RATE, changes,
+                    f, u, self.touch,
                 )  # fmt: skip
-                sweeps += 1
-                changes = [*changes[-2:], change]
-                size = float(np.linalg.norm(f))
-                near = _left(changes, relaxation) <= tolerance * size
-                if near or (turn + 1) % CHECK_EVERY == 0:
-                    residual = self._residual(f, u)
-                    # Without a steady rate of convergence the residual decides, with a margin.
-                    if residual <= (tolerance if near else SURE * tolerance) and (
-                        near or turn >= PATIENCE
-                    ):
-                        return self._balance(f, u, residual, sweeps)
-                    best = min(best, residual)
-                    if residual > SLOW * last:
-                        newton += 1
-                        found = self._newton(f, residual, tolerance) if newton <= 20 else None
-                        if found is not None:
-                            f = found
-                            u = self._motion(f)
-                            residual = self._residual(f, u)
-                            if residual <= SURE * tolerance:
-                                return self._balance(f, u, residual, sweeps)
-                            changes = [np.inf, np.inf]
-                    last = residual
+                turn, count = turn + done, count + done
+                residual = self._residual(f, u)
+                # Without a steady rate of convergence the residual decides, with a margin.
+                if residual <= (tolerance if near else SURE * tolerance) and (
+                    near or turn > PATIENCE
+                ):
+                    return self._balance(f, u, residual, count)
+                best = min(best, residual)
+                if residual > SLOW * last:
+                    newton += 1
+                    found = self._newton(f, residual, tolerance) if newton <= 20 else None
+                    if found is not None:
+                        f = found
+                        u = self._motion(f)
+                        residual = self._residual(f, u)
+                        if residual <= SURE * tolerance:
+                            return self._balance(f, u, residual, count)
+                        changes[:] = np.inf
+                last = residual
         raise ContactError(
             f"the contact of {len(self.height)} nodes with friction {self.mu.max():g} did not "
-            f"converge in {sweeps} sweeps: the smallest residual is {best:.1e} of the forces, the "
+            f"converge in {count} sweeps: the smallest residual is {best:.1e} of the forces, the "
             f"tolerance {tolerance:.1e}; take smaller steps of the motion, a lower friction or a "
             "larger tolerance",
             best,

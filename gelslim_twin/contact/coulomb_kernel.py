@@ -147,6 +147,56 @@ def sweep(
 
 
 @njit(cache=True)
+def sweeps(
+    compliance: Any,
+    own: Any,
+    frames: Any,
+    height: Any,
+    target: Any,
+    friction: Any,
+    relaxation: float,
+    turn: int,
+    most: int,
+    tolerance: float,
+    least_rate: float,
+    changes: Any,
+    f: Any,
+    u: Any,
+    touch: Any,
+) -> Any:
+    """Sweeps, to and fro, until the forces seem to be near the solution.
+
+    Arguments are those of `sweep` and:
+
+        turn: number of the first sweep; those with an odd number go backwards.
+        most: most sweeps.
+        tolerance: error of the forces over the forces that counts as near.
+        least_rate: least rate of convergence that is assumed.
+        changes: (3,) of the forces in the last sweeps, the latest last; kept up to date.
+
+    Returns the number of sweeps, and whether the remainder of a geometric series of the last
+    changes is within the tolerance.
+    """
+    for number in range(most):
+        change = sweep(
+            compliance, own, frames, height, target, friction, relaxation,
+            (turn + number) % 2 == 1, f, u, touch,
+        )  # fmt: skip
+        changes[0], changes[1], changes[2] = changes[1], changes[2], change
+        rate = least_rate
+        if 0.0 < changes[0] < math.inf:
+            rate = max(rate, math.sqrt(change / changes[0]))
+        if rate >= 1.0:
+            continue
+        size = 0.0
+        for value in f:
+            size += value * value
+        if change * rate / (1.0 - rate) / relaxation <= tolerance * math.sqrt(size):
+            return number + 1, True
+    return most, False
+
+
+@njit(cache=True)
 def answers(
     own: Any,
     frames: Any,

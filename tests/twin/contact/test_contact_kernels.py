@@ -15,6 +15,7 @@ from gelslim_twin.contact.coulomb_kernel import (
     motion,
     node_force,
     sweep,
+    sweeps,
 )
 from ifem_export.compliance.columns_kernel import add_motion, gather_block
 
@@ -124,6 +125,36 @@ def test_a_sweep_goes_from_node_to_node(seed: int, relaxation: float, backwards:
     np.testing.assert_allclose(u, p.compliance @ f, atol=1e-11)
     assert change == pytest.approx(np.linalg.norm(force - p.force))
     assert list(kinds) == touch[:: -1 if backwards else 1]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("relaxation", "turn", "most"), [(1.0, 0, 40), (0.6, 3, 40), (1.0, 1, 3)])
+def test_sweeps_end_where_the_rest_of_a_geometric_series_is_small(
+    seed: int, relaxation: float, turn: int, most: int
+) -> None:
+    p, tolerance, least = Problem(seed), 1e-4, 0.5
+    given = p.compliance, p.own, p.frames, p.height, p.target, p.friction, relaxation
+    f, kinds = p.force.reshape(-1).copy(), np.zeros(NODES, dtype=np.int8)
+    u = p.compliance @ f
+    steps: list[float] = [np.inf, np.inf]
+    done, near = 0, False
+    while not near and done < most:
+        steps.append(sweep(*given, (turn + done) % 2 == 1, f, u, kinds))
+        done += 1
+        rate = least
+        if np.isfinite(steps[-3]):
+            rate = max(least, (steps[-1] / steps[-3]) ** 0.5)
+        rest = steps[-1] * rate / (1 - rate) / relaxation if rate < 1 else np.inf
+        near = rest <= tolerance * np.linalg.norm(f)
+    g, found, changes = p.force.reshape(-1).copy(), kinds.copy(), np.full(3, np.inf)
+    v = p.compliance @ g
+    told = sweeps(*given, turn, most, tolerance, least, changes, g, v, found)
+    assert told == (done, near)
+    assert near == (most > 3)
+    np.testing.assert_allclose(changes, steps[-3:], rtol=1e-12)
+    np.testing.assert_allclose(g, f, atol=1e-13)
+    np.testing.assert_allclose(v, u, atol=1e-12)
+    assert list(found) == list(kinds)
 
 
 def test_a_sweep_leaves_slipping_nodes_on_the_cone_to_rounding() -> None:
