@@ -1,61 +1,90 @@
-"""A record from a JSON file, or the reason why there is none."""
+"""JSON files that hold one record of a kind, such as a calibration."""
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
-Kind = TypeVar("Kind")
+from gelslim_core.files.replaced_file import json_bytes, replace_file
+
+Value = TypeVar("Value")
+Record = Mapping[str, Any]
 
 
-def read_json_record(
-    place: Path,
-    read: Callable[[Mapping[str, Any]], Kind],
-    refused: Callable[[str, bool], Exception],
-) -> Kind:
-    """Read a JSON file that holds one object.
+@dataclass(frozen=True)
+class RecordFile(Generic[Value]):
+    """Writes and reads one kind of file.
 
-    Args:
-        place: The file.
-        read: Makes the result of the object; it may raise KeyError, ValueError, TypeError,
-            IndexError, AttributeError or OverflowError for an object of another kind.
-        refused: Makes the error of a reason, and of whether the file could be opened.
-
-    Returns:
-        What `read` makes.
-
-    Raises:
-        Exception: Of `refused`, where the file cannot be opened or holds something else.
+    Attributes:
+        form: What `format` is in its records.
+        name: What such a file is, such as "light calibration".
+        remedy: What to do where there is none.
+        record: Makes the record of a value, with its `format`.
+        value: Makes the value of a record; it may raise KeyError, ValueError, TypeError,
+            IndexError, AttributeError or OverflowError for one of another kind.
+        error: Makes the error of a message.
     """
-    try:
-        content = place.read_bytes()
-    except OSError as error:
-        raise refused((error.strerror or "cannot be read").lower(), False) from error
-    try:
-        record = json.loads(content.decode("utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise refused(f"it is not JSON ({error})", True) from error
-    if not isinstance(record, Mapping):
-        raise refused("it does not hold a JSON object", True)
-    try:
-        return read(record)
-    except KeyError as error:
-        raise refused(f"{error.args[0]} is missing", True) from error
-    except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
-        raise refused(str(error), True) from error
 
+    form: str
+    name: str
+    remedy: str
+    record: Callable[[Value], Record]
+    value: Callable[[Record], Value]
+    error: Callable[[str], Exception]
 
-def refusal(place: Path, kind: str, remedy: str, reason: str, opened: bool) -> str:
-    """Words for a file that holds no record of a kind.
+    def write(self, value: Value, path: str | os.PathLike[str]) -> None:
+        """Write a file as a whole: an earlier one is kept if writing fails.
 
-    Args:
-        place: The file.
-        kind: What it should hold, such as "light calibration".
-        remedy: What to do.
-        reason: Why it is refused.
-        opened: Whether it could be opened.
-    """
-    what = f"{place} is no {kind}" if opened else f"{place}"
-    return f"{what}: {reason}; {remedy}"
+        Args:
+            value: What to write.
+            path: File to write; its folder must exist.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        replace_file(path, json_bytes(self.record(value)))
+
+    def read(self, path: str | os.PathLike[str]) -> Value:
+        """Read a file.
+
+        Args:
+            path: The file.
+
+        Returns:
+            What `value` makes.
+
+        Raises:
+            Exception: Of `error`, where the file cannot be opened, is damaged or of another kind.
+        """
+        place = Path(path)
+        try:
+            content = place.read_bytes()
+        except OSError as error:
+            raise self._refused(
+                f"{place}: {(error.strerror or 'cannot be read').lower()}"
+            ) from error
+        try:
+            return self._value(content)
+        except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
+            raise self._refused(f"{place} is no {self.name}: {error}") from error
+
+    def _value(self, content: bytes) -> Value:
+        try:
+            record = json.loads(content.decode("utf-8"))
+        except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+            raise ValueError(f"it is not JSON ({error})") from error
+        if not isinstance(record, Mapping):
+            raise ValueError("it does not hold a JSON object")
+        if record.get("format") != self.form:
+            raise ValueError(f"its format is {record.get('format')!r}, not {self.form}")
+        try:
+            return self.value(record)
+        except KeyError as error:
+            raise ValueError(f"{error.args[0]} is missing") from error
+
+    def _refused(self, message: str) -> Exception:
+        return self.error(f"{message}; {self.remedy}")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Callable, Mapping
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.json_record import read_json_record
-from gelslim_core.files.replaced_file import json_bytes, replace_file
+from gelslim_core.files.json_record import RecordFile
 from gelslim_force.calibration.built_deviation import BuiltDeviation
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 from gelslim_force.calibration.error import CalibrationError
@@ -25,6 +24,7 @@ from ifem_export.markers.grid import MarkerGrid
 from ifem_export.markers.lattice_frame import LatticeFrame
 
 FORMAT = "gelslim-calibration/1"
+_MAKE = "make it with `gelslim calibrate BUNDLE REFERENCE -o FILE`"
 _GRID = ("positions_mm", "row", "column", "diameter_mm", "kind", "pitch_mm", "lattice_shape",
          "omitted")  # fmt: skip
 _DOTS = ("centres_px", "area_px", "contrast", "moments_px2", "flags")
@@ -54,11 +54,9 @@ def calibration_record(calibration: Calibration) -> dict[str, Any]:
 def calibration_of(record: Mapping[str, Any]) -> Calibration:
     """Return the calibration of a record.
 
-    Raises ValueError, KeyError or TypeError for a record of another format. `read_calibration`
-    turns these into errors that name the file.
+    Raises ValueError, KeyError or TypeError for a record of another kind. `read_calibration` turns
+    these into errors that name the file, and refuses another format.
     """
-    if record.get("format") != FORMAT:
-        raise ValueError(f"its format is {record.get('format')!r}, only {FORMAT} is known")
     deviation, picture = record["deviation"], record.get("picture")
     grid, dots = record["grid"], record["dots"]
     return Calibration(
@@ -105,7 +103,7 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike[str]) ->
     Raises:
         OSError: The file cannot be written.
     """
-    replace_file(path, json_bytes(calibration_record(calibration)))
+    _FILE.write(calibration, path)
 
 
 def read_calibration(path: str | os.PathLike[str]) -> Calibration:
@@ -120,18 +118,7 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     Raises:
         CalibrationError: There is no such file, or it is damaged.
     """
-    place = Path(path)
-
-    def refused(reason: str, opened: bool) -> CalibrationError:
-        make = "`gelslim calibrate BUNDLE REFERENCE -o FILE`"
-        if not opened:
-            return CalibrationError("file", f"{place}: {reason}; make it with {make}")
-        return CalibrationError(
-            "file",
-            f"{place} is not a calibration that can be used: {reason}; calibrate again with {make}",
-        )
-
-    return read_json_record(place, calibration_of, refused)
+    return _FILE.read(path)
 
 
 def _grid_record(grid: MarkerGrid) -> dict[str, Any]:
@@ -201,3 +188,13 @@ def _finite(values: Any, name: str) -> NDArray[np.float64]:
     if not np.isfinite(array).all():
         raise ValueError(f"{name} holds a value that is not finite")
     return array
+
+
+_FILE = RecordFile(
+    FORMAT,
+    "calibration",
+    _MAKE,
+    calibration_record,
+    calibration_of,
+    partial(CalibrationError, "file"),
+)

@@ -8,14 +8,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.json_record import read_json_record, refusal
-from gelslim_core.files.replaced_file import json_bytes, replace_file
+from gelslim_core.files.json_record import RecordFile
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.presses.press_error import PressError
 from ifem_export.elements.skin import restiffened
@@ -210,7 +209,7 @@ def write_gel_calibration(found: GelCalibration, path: str | os.PathLike[str]) -
     Raises:
         OSError: The file cannot be written.
     """
-    replace_file(path, json_bytes(gel_calibration_record(found)))
+    _FILE.write(found, path)
 
 
 def read_gel_calibration(path: str | os.PathLike[str]) -> GelCalibration:
@@ -225,17 +224,10 @@ def read_gel_calibration(path: str | os.PathLike[str]) -> GelCalibration:
     Raises:
         PressError: There is no such file, or it is damaged or of another kind.
     """
-    place = Path(path)
-
-    def refused(reason: str, opened: bool) -> PressError:
-        return PressError("file", refusal(place, "gel calibration", _MAKE, reason, opened))
-
-    return read_json_record(place, _calibration_of, refused)
+    return _FILE.read(path)
 
 
 def _calibration_of(record: Mapping[str, Any]) -> GelCalibration:
-    if record.get("format") != FORMAT:
-        raise ValueError(f"its format is not {FORMAT}")
     skin = record.get("skin_n_per_mm")
     expected = PARAMETERS[: 3 if skin is None else 4]
     if tuple(record["parameters"]) != expected:
@@ -254,3 +246,13 @@ def _calibration_of(record: Mapping[str, Any]) -> GelCalibration:
         None if skin is None else float(skin),
         dict(record.get("gel", {})),
     )
+
+
+_FILE = RecordFile(
+    FORMAT,
+    "gel calibration",
+    _MAKE,
+    gel_calibration_record,
+    _calibration_of,
+    partial(PressError, "file"),
+)

@@ -11,15 +11,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.errors import GelslimError
-from gelslim_core.files.json_record import read_json_record, refusal
-from gelslim_core.files.replaced_file import json_bytes, replace_file
+from gelslim_core.files.json_record import RecordFile
+from gelslim_core.files.replaced_file import json_bytes
 from gelslim_force.calibration.stored_picture import picture_of, picture_record
 
 if TYPE_CHECKING:
@@ -176,7 +175,7 @@ def write_look(look: BuiltLook, path: str | os.PathLike[str]) -> None:
     Raises:
         OSError: The file cannot be written.
     """
-    replace_file(path, json_bytes(look_record(look)))
+    _FILE.write(look, path)
 
 
 def read_look(path: str | os.PathLike[str]) -> BuiltLook:
@@ -191,17 +190,10 @@ def read_look(path: str | os.PathLike[str]) -> BuiltLook:
     Raises:
         LookError: There is no such file, or it is damaged or of another kind.
     """
-    place = Path(path)
-
-    def refused(reason: str, opened: bool) -> LookError:
-        return LookError(refusal(place, "look of a sensor", _MAKE, reason, opened))
-
-    return read_json_record(place, _look_of, refused)
+    return _FILE.read(path)
 
 
 def _look_of(record: Mapping[str, Any]) -> BuiltLook:
-    if record.get("format") != FORMAT:
-        raise ValueError(f"its format is not {FORMAT}")
     count = len(record["markers"])
     values: dict[str, Any] = {name: float(record[name]) for name in _NUMBERS}
     values |= {name: np.array(record[name], dtype=float) for name in _ARRAYS}
@@ -218,3 +210,6 @@ def _look_of(record: Mapping[str, Any]) -> BuiltLook:
         warnings=tuple(str(line) for line in record["warnings"]),
         **values,
     )
+
+
+_FILE = RecordFile(FORMAT, "look of a sensor", _MAKE, look_record, _look_of, LookError)

@@ -1,4 +1,4 @@
-"""Records from JSON files: what is read, and the reason where nothing is."""
+"""Files with one record: what is written is read, and what is no such file is refused."""
 
 from __future__ import annotations
 
@@ -8,24 +8,30 @@ from typing import Any
 
 import pytest
 
-from gelslim_core.files.json_record import read_json_record
+from gelslim_core.files.json_record import RecordFile
 
 
 class RefusedError(Exception):
-    """A reason, and whether the file could be opened."""
+    """Of a file."""
 
 
 def root(record: Mapping[str, Any]) -> float:
     return float(record["numbers"][1]) ** 0.5
 
 
-def found(place: Path) -> float:
-    return read_json_record(place, root, RefusedError)
+def squares(value: float) -> dict[str, Any]:
+    return {"format": "roots/1", "numbers": [1.0, value**2]}
 
 
-def test_the_result_is_made_of_the_record(tmp_path: Path) -> None:
-    (tmp_path / "a.json").write_text('{"numbers": [1, 9]}', encoding="utf-8")
-    assert found(tmp_path / "a.json") == 3.0
+FILE = RecordFile("roots/1", "root", "draw it", squares, root, RefusedError)
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    FILE.write(3.0, tmp_path / "a.json")
+    assert FILE.read(tmp_path / "a.json") == 3.0
+    with pytest.raises(ValueError, match="JSON"):
+        FILE.write(float("nan"), tmp_path / "a.json")
+    assert FILE.read(str(tmp_path / "a.json")) == 3.0
 
 
 @pytest.mark.parametrize(
@@ -35,10 +41,12 @@ def test_the_result_is_made_of_the_record(tmp_path: Path) -> None:
         (b"\xff", "JSON"),
         (b"[" * 100_000, "JSON"),
         (b"[1]", "object"),
-        (b"{}", "numbers is missing"),
-        (b'{"numbers": [1]}', "range"),
-        (b'{"numbers": [1, "x"]}', "x"),
-        (b'{"numbers": null}', "None"),
+        (b"{}", "None, not roots/1"),
+        (b'{"format": "roots/2", "numbers": [1, 9]}', "roots/2"),
+        (b'{"format": "roots/1"}', "numbers is missing"),
+        (b'{"format": "roots/1", "numbers": [1]}', "range"),
+        (b'{"format": "roots/1", "numbers": [1, "x"]}', "x"),
+        (b'{"format": "roots/1", "numbers": null}', "None"),
     ],
 )
 def test_what_holds_no_record_is_refused_with_the_reason(
@@ -46,12 +54,14 @@ def test_what_holds_no_record_is_refused_with_the_reason(
 ) -> None:
     (tmp_path / "a.json").write_bytes(content)
     with pytest.raises(RefusedError, match=reason) as refused:
-        found(tmp_path / "a.json")
-    assert refused.value.args[1] is True
+        FILE.read(tmp_path / "a.json")
+    assert "is no root" in str(refused.value)
+    assert str(refused.value).endswith("; draw it")
 
 
 def test_what_cannot_be_opened_is_told_apart(tmp_path: Path) -> None:
     for place in (tmp_path / "missing.json", tmp_path):
         with pytest.raises(RefusedError) as refused:
-            found(place)
-        assert refused.value.args[1] is False
+            FILE.read(place)
+        assert "is no root" not in str(refused.value)
+        assert str(place) in str(refused.value)

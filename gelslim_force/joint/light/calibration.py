@@ -10,14 +10,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.json_record import read_json_record, refusal
-from gelslim_core.files.replaced_file import json_bytes, replace_file
+from gelslim_core.files.json_record import RecordFile
 from gelslim_force.calibration.error import CalibrationError
 
 if TYPE_CHECKING:
@@ -145,7 +144,7 @@ def write_light_calibration(found: LightCalibration, path: str | os.PathLike[str
     Raises:
         OSError: The file cannot be written.
     """
-    replace_file(path, json_bytes(light_calibration_record(found)))
+    _FILE.write(found, path)
 
 
 def read_light_calibration(path: str | os.PathLike[str]) -> LightCalibration:
@@ -160,17 +159,10 @@ def read_light_calibration(path: str | os.PathLike[str]) -> LightCalibration:
     Raises:
         CalibrationError: There is no such file, or it is damaged or of another kind.
     """
-    place = Path(path)
-
-    def refused(reason: str, opened: bool) -> CalibrationError:
-        return CalibrationError("file", refusal(place, "light calibration", _MAKE, reason, opened))
-
-    return read_json_record(place, _calibration_of, refused)
+    return _FILE.read(path)
 
 
 def _calibration_of(record: Mapping[str, Any]) -> LightCalibration:
-    if record.get("format") != FORMAT:
-        raise ValueError(f"its format is not {FORMAT}")
     return LightCalibration(
         str(record["geometry_hash"]),
         tuple(int(channel) for channel in record["channels"]),
@@ -187,3 +179,13 @@ def _calibration_of(record: Mapping[str, Any]) -> LightCalibration:
         tuple(str(line) for line in record["warnings"]),
         dict(record.get("gel", {})),
     )  # fmt: skip
+
+
+_FILE = RecordFile(
+    FORMAT,
+    "light calibration",
+    _MAKE,
+    light_calibration_record,
+    _calibration_of,
+    partial(CalibrationError, "file"),
+)

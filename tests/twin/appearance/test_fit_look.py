@@ -115,7 +115,7 @@ def test_a_look_is_the_same_after_writing_and_reading(fitted: FittedLook, tmp_pa
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{}", "its format is not gelslim-look/1"),
+        ("{}", "not gelslim-look/1"),
         ("[1]", "does not hold a JSON object"),
         ('{"format": "gelslim-look/1"}', "markers is missing"),
     ],
