@@ -139,7 +139,8 @@ def test_the_share_of_the_skin_is_that_of_true_rebuilds() -> None:
     wrench = WrenchNoise(points, np.zeros((6, len(points), 3))).wrench(
         made.surface_operator("factor").force(motion), np.zeros((6, 6))
     )
-    found = GelShare.of(bundle, gel, "neo_hookean").added(wrench, motion, reading)
+    share = replace(GelShare.of(bundle, gel), thickness_mm=np.inf)  # without that of the law
+    found = share.added(wrench, motion, reading)
     np.testing.assert_allclose(found.covariance, expected, atol=0.1 * expected.max())
     assert covariance[3, 3] * slopes[2, 2] ** 2 > 0.3 * expected[2, 2]
 
@@ -209,7 +210,8 @@ def test_a_hidden_skin_is_told_found_and_enters_the_forces(poissons_ratio: float
         assert wrench is not None
         forces.append((float(wrench.force_n[2]), float(wrench.standard_deviation[2])))
     (before, _), (after, sigma) = forces
-    assert abs(before + 0.4) > 0.08
+    # A bare gel is far off, or refused: its contact explains half the change of the light.
+    assert np.isnan(before) or abs(before + 0.4) > 0.08
     assert abs(after + 0.4) < min(0.025, 2 * sigma)
 
 
