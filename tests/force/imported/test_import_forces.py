@@ -19,6 +19,7 @@ from gelslim_force.calibration.file import read_calibration, write_calibration
 from gelslim_force.imported.importer import ImportedSensor
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import open_sensor
+from gelslim_force.settings import PipelineSettings
 from ifem_export.bundle.files import load_bundle, write_bundle
 
 pytestmark = pytest.mark.slow
@@ -49,7 +50,9 @@ def sensor(rest: Frame, tmp_path_factory: pytest.TempPathFactory) -> ImportedSen
 
 @pytest.fixture(scope="module")
 def pipeline(sensor: ImportedSensor) -> ForcePipeline:
-    return open_sensor(sensor.bundle, calibration=sensor.calibration)
+    """The gel of the push is linear."""
+    linear = PipelineSettings(gel="linear")
+    return open_sensor(sensor.bundle, calibration=sensor.calibration, settings=linear)
 
 
 def pushed(share: float, seed: int) -> Frame:
