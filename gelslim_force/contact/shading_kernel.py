@@ -65,7 +65,14 @@ def _mark_glare(most: Any, size: Any, channels: Any, glaring: Any) -> None:
 
 @njit(**COMPILED)
 def light_ratios(
-    first: Any, second: Any, mask: Any, glaring: Any, size: Any, floor: Any, ratios: Any, counts: Any
+    first: Any,
+    second: Any,
+    mask: Any,
+    glaring: Any,
+    size: Any,
+    floor: Any,
+    ratios: Any,
+    counts: Any,
 ) -> None:
     """Ratios (c, rows, columns) of the light of two images (h, w, c) uint8, `floor` added to both.
 

@@ -19,7 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gelslim_force.joint.deepness import deepness, settings_at, traction_sigma_mpa
+from gelslim_force.joint.deepness import (
+    deepness,
+    least_pressure_at,
+    light_share_at,
+    traction_sigma_mpa,
+)
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces, SoughtForces
@@ -166,7 +171,7 @@ class JointEstimator:
     def _pressing(self, nodes: Mask, state: FitState) -> Mask:
         """Those of the nodes (c,) that press in an estimate, and what they enclose."""
         pressure = -state.force_n[:, 2] / self.area_mm2
-        least = settings_at(self.settings, self.deepness(state)).least_pressure
+        least = least_pressure_at(self.settings, self.deepness(state))
         return pressing_nodes(nodes, pressure, self.neighbours, least)
 
     def shown(self, image: NDArray[np.uint8], markers_px: Array) -> Mask:
@@ -299,7 +304,7 @@ class JointEstimator:
         used = np.flatnonzero(wide[self.marker_node] & frame.markers.known)
         model, bent = np.vsplit(self._to_markers @ moved_mm, 2)
         lateral = frame.markers.lateral(used, model[used, 2])
-        rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
+        rows = self.responses.of_markers(np.flatnonzero(near), used)
         share = chosen.marker_share * rms_length(model[used])
         errors = math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT
         motion = model, bent, self.by_height, frame.noise_mm
@@ -327,8 +332,8 @@ class JointEstimator:
         close = None if finer_mm is None else self.lattice.widened(near, _CLOSE)
         at = self.light, frame.seen, self.lattice, moved_mm, wide
         bins = placed_bins(*at, relief, finer, close)
-        chosen = settings_at(self.settings, self.deepness(state))
-        error = math.hypot(chosen.light_error, chosen.light_share * rms_length(bins.change.T))
+        share = light_share_at(self.settings, self.deepness(state))
+        error = math.hypot(self.settings.light_error, share * rms_length(bins.change.T))
         height = moved_mm[:, 2] if finer_mm is None else finer_mm
         return bins.sums(self.law, height, state.gain, error)
 

@@ -122,7 +122,8 @@ class LightView:
         grey = np.stack([self._light.levels()[c] for c in self.channels]).astype(float)
         falling = light.at(self.rest_mm[..., 0], self.rest_mm[..., 1])
         share = light.colour[:, None, None, self.channels] * np.moveaxis(falling, -1, 0)[..., None]
-        share = np.moveaxis(share, -1, 1)
+        # In the order of the bins: each frame reads a part of them several times.
+        share = np.ascontiguousarray(np.moveaxis(share, -1, 1))
         return grey / (grey + FLOOR), share / np.maximum(share.sum(axis=0), 1e-12)
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenLight:
