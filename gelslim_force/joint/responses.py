@@ -46,7 +46,7 @@ class Responses:
         self._make(np.arange(len(self._made)))
 
     def of_markers(self, nodes: Nodes, markers: Nodes) -> Single:
-        """(2m, 3p) what a picture shows of the motion of markers (m,) under forces on nodes (p,)."""
+        """(2m, 3p) motion of markers (m,) as a picture shows it, under forces on nodes (p,)."""
         from gelslim_force.joint.kernels.light_kernel import gather_markers
 
         self._make(nodes)

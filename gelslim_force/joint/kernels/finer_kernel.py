@@ -107,8 +107,9 @@ def stencil_columns(stencil: Any, at: Any, places: Any, columns: Any, found: Any
         for n in range(len(at)):
             a, b = x - at[n, 0], y - at[n, 1]
             if 0 <= a < size and 0 <= b < size:
-                for source in columns[n]:
-                    out[source] += share * stencil[a, b]
+                height = share * stencil[a, b]
+                for k in range(columns.shape[1]):
+                    out[columns[n, k]] += height
 
 
 @njit(**COMPILED)
