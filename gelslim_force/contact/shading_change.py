@@ -209,9 +209,17 @@ class ShadingReference:
             return np.zeros(self.shape, dtype=bool)
         seen = self._counts > 0
         brightest = self._ratios[self.used].max(axis=0)
-        usual = np.median(brightest[seen & self.on_pad]) if (seen & self.on_pad).any() else 1.0
+        usual = _median(brightest[seen & self.on_pad])
         dark = seen & (brightest < _OPAQUE * usual)
         return np.asarray(binary_dilation(dark, np.ones((3, 3)))) if dark.any() else dark
+
+
+def _median(values: NDArray[np.float32]) -> np.float32:
+    """The median of values (n,), as `np.median` gives it in three times the time; 1 without any."""
+    if not len(values):
+        return np.float32(1.0)
+    middle = (len(values) - 1) // 2, len(values) // 2
+    return np.float32(np.partition(values, middle)[list(middle)].mean())
 
 
 def is_grey(picture: NDArray[np.uint8]) -> bool:
