@@ -116,7 +116,7 @@ class ShadingReference:
         self._coloured = not is_grey(self.image)
         from gelslim_force.contact.shading_kernel import FREE, block_discs, glaring_bins
 
-        self._mask = np.full((height, width, channels), FREE, dtype=np.uint8)
+        self._mask = np.full((height, width), FREE, dtype=np.uint8)
         block_discs(self._mask, np.asarray(markers_px, dtype=float), radius_px)
         self._scratch = np.empty_like(self._mask)
         self._glaring = np.zeros((2, *self.shape), dtype=np.uint8)
@@ -139,7 +139,7 @@ class ShadingReference:
         rows, columns = self.shape
         size = self.bin_px
         cut = slice(0, rows * size), slice(0, columns * size)
-        free = (self._mask[(*cut, 0)] != 0).astype(np.float32)
+        free = (self._mask[cut] != 0).astype(np.float32)
 
         def summed(picture: NDArray[np.float32]) -> NDArray[np.float32]:
             return picture.reshape(rows, size, columns, size).sum(axis=(1, 3))

@@ -16,10 +16,8 @@ FREE = 255
 
 @njit(**COMPILED)
 def block_discs(mask: Any, centres: Any, radius: Any) -> None:
-    """Set `mask` (h, w, c) to 0 in discs of `radius` (n,) px around `centres` (n, 2); NaN is
-    skipped."""
-    height, width, channels = mask.shape
-    flat = mask.reshape(height, width * channels)
+    """Set `mask` (h, w) to 0 in discs of `radius` (n,) px about `centres` (n, 2) that are known."""
+    height, width = mask.shape
     for k in range(len(centres)):
         x, y, r = centres[k, 0], centres[k, 1], radius[k]
         if not (x > -r and y > -r and x < width + r and y < height + r):
@@ -27,10 +25,10 @@ def block_discs(mask: Any, centres: Any, radius: Any) -> None:
         for i in range(max(0, math.ceil(y - r)), min(height, math.floor(y + r) + 1)):
             half = math.sqrt(max(r * r - (i - y) ** 2, 0.0))
             first, past = max(0, math.ceil(x - half)), min(width, math.floor(x + half) + 1)
+            row = mask[i]
             # Unsigned places cannot count from the end, which would keep them from the vector unit.
-            row = flat[i]
-            for at in range(np.uintp(channels * first), np.uintp(channels * max(first, past))):
-                row[at] = 0
+            for j in range(np.uintp(first), np.uintp(max(first, past))):
+                row[j] = 0
 
 
 @njit(**COMPILED)
@@ -76,22 +74,19 @@ def light_ratios(
 ) -> None:
     """Ratios (c, rows, columns) of the light of two images (h, w, c) uint8, `floor` added to both.
 
-    Pixels whose `mask` (h, w, c) is 0, and those that are saturated in all channels of one image,
+    Pixels whose `mask` (h, w) is 0, and those that are saturated in all channels of one image,
     are left out of both images; `counts` (rows, columns) are the remaining ones. The latter are
     looked for in the bins marked in `glaring` (rows, columns).
     """
     channels, rows, columns = ratios.shape
     height, width = first.shape[0], first.shape[1] * channels
-    a, b, kept = (
-        first.reshape(height, width),
-        second.reshape(height, width),
-        mask.reshape(height, width),
-    )
+    a, b = first.reshape(height, width), second.reshape(height, width)
+    kept = np.empty(width, dtype=np.uint8)
     down, along = np.empty((3, width), dtype=np.uint16), np.empty((3, width), dtype=np.uint32)
     least = np.empty(columns)
     step = size * channels
     for row in range(rows):
-        _sum_down(a, b, kept, row * size, size, down)
+        _sum_down(a, b, mask, row * size, size, kept, down)
         for part in range(3):
             _sum_along(down[part], size, channels, along[part])
         for column in range(columns):
@@ -110,16 +105,30 @@ def light_ratios(
 
 
 @njit(**COMPILED)
-def _sum_down(a: Any, b: Any, kept: Any, top: Any, size: Any, down: Any) -> None:
-    """Sums (3, w) down `size` rows of both images and of the mask, where the mask is FREE."""
+def _sum_down(a: Any, b: Any, mask: Any, top: Any, size: Any, kept: Any, down: Any) -> None:
+    """Sums (3, w c) down `size` rows of both images (h, w c) and of 1, where the `mask` (h, w) is
+    FREE; `kept` (w c,) is overwritten."""
     first, second, free = down[0], down[1], down[2]
     first[:], second[:], free[:] = 0, 0, 0
     for i in range(top, top + size):
-        some, other, mask = a[i], b[i], kept[i]
+        _spread_mask(mask[i], kept)
+        some, other = a[i], b[i]
         for k in range(len(free)):
-            first[k] += some[k] & mask[k]
-            second[k] += other[k] & mask[k]
-            free[k] += mask[k] & 1
+            first[k] += some[k] & kept[k]
+            second[k] += other[k] & kept[k]
+            free[k] += kept[k] & 1
+
+
+@njit(**COMPILED)
+def _spread_mask(row: Any, found: Any) -> None:
+    """Repeat each value (w,) of a row for every channel, to `found` (w c,)."""
+    if len(found) == len(row):
+        found[:] = row
+        return
+    one, two = np.uintp(1), np.uintp(2)
+    for j in range(np.uintp(len(row))):
+        at = np.uintp(3) * j
+        found[at] = found[at + one] = found[at + two] = row[j]
 
 
 @njit(**COMPILED)
@@ -143,7 +152,7 @@ def _without_glare(
     found[:] = 0
     for i in range(top, top + size):
         for j in range(left, left + size):
-            if mask[i, j, 0] == 0 or _glares(first[i, j]) or _glares(second[i, j]):
+            if mask[i, j] == 0 or _glares(first[i, j]) or _glares(second[i, j]):
                 continue
             for c in range(found.shape[1]):
                 found[0, c] += first[i, j, c]

@@ -338,12 +338,12 @@ def test_light_ratios_are_those_of_numpy():
         pair = rng.integers(0, 256, (2, 50, 70, channels)).astype(np.uint8)
         pair[:, 30:40, 20:40] = 255
         pair = read_only(pair)
-        mask = np.full((50, 70, channels), FREE, np.uint8)
+        mask = np.full((50, 70), FREE, np.uint8)
         discs = np.array([[20.3, 10.0], [-2.0, 60.0], [np.nan, 1.0], [68.6, 48.7]])
         block_discs(mask, discs, np.full(4, 5.5))
         y, x = np.mgrid[:50, :70]
         blocked = (np.hypot(x - 20.3, y - 10) <= 5.5) | (np.hypot(x - 68.6, y - 48.7) <= 5.5)
-        assert (mask == np.where(blocked, 0, FREE)[..., None]).all()
+        assert (mask == np.where(blocked, 0, FREE)).all()
         glaring = np.ones((2, 12, 17), np.uint8)
         for image, may in zip(pair, glaring, strict=True):
             glaring_bins(image, 4, may)
