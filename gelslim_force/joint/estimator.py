@@ -232,21 +232,20 @@ class JointEstimator:
 
         What is not resolved: a share of the motion of all, and of each marker's `bending`.
         """
+        from gelslim_force.joint.kernels.fit_kernel import sparse_rows
+
         chosen = self.settings
         wide = self.lattice.widened(near, chosen.marker_reach)
         used = np.flatnonzero(wide[self.marker_node] & frame.markers.known)
-        model, bent = np.vsplit(self._to_markers @ moved_mm, 2)
+        model, bent = np.empty((2, len(self.markers), 3))
+        for matrix, found in ((self.nodes_to_markers, model), (self.bending, bent)):
+            sparse_rows(matrix.indptr, matrix.indices, matrix.data, used, moved_mm, found)
         lateral = frame.markers.lateral(used, model[used, 2])
         rows = self.responses.of_markers(np.flatnonzero(near), used)
         share = chosen.marker_share * rms_length(model[used])
         errors = math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT
         motion = model, bent, self.by_height, frame.noise_mm
         return MarkerRows.of(used, rows, lateral, motion, errors)
-
-    @cached_property
-    def _to_markers(self) -> sparse.csr_array:
-        """(2n, c) `nodes_to_markers` over `bending`."""
-        return sparse.csr_array(sparse.vstack([self.nodes_to_markers, self.bending]))
 
     def light_sums(
         self, frame: FrameData, near: Mask, moved_mm: Array, state: FitState, finer_mm: Any = None

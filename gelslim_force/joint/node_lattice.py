@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from gelslim_force.joint.morphology import filled, widened
+from gelslim_force.joint.morphology import filled
 from ifem_export.markers.interpolation import marker_to_node
 
 Array = NDArray[np.float64]
@@ -208,8 +208,12 @@ class NodeLattice:
         """(c,) the nodes and those up to `rings` steps along the lattice away."""
         if rings < 1:
             return nodes
-        wide = widened(self.picture(nodes), rings)
-        return np.asarray(wide[self.place[:, 0], self.place[:, 1]])
+        from gelslim_force.joint.kernels.region_kernel import widen_nodes
+
+        found = np.empty(len(nodes), dtype=bool)
+        distance = np.empty(self.number.shape, dtype=np.int64)
+        widen_nodes(nodes, self.place, rings, distance, found)
+        return found
 
     def place_number(self, points_mm: Array) -> Nodes:
         """(n,) number, row by row, of the place nearest to each point (n, 2); -1 beyond them."""

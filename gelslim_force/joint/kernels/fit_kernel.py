@@ -54,6 +54,28 @@ def marker_data(
             weight[2 * k + axis] = min(1.0, limit / max(size, 1e-12)) / variance
 
 
+@njit(**COMPILED)
+def sparse_rows(starts: Any, columns: Any, values: Any, rows: Any, right: Any, found: Any) -> None:
+    """Some rows (m,) of the product of a sparse matrix by rows and `right` (c, 3).
+
+    Args:
+        starts: (n + 1,) first entry of each row of the sparse matrix.
+        columns: Of its entries.
+        values: Of its entries.
+        rows: (m,) of it.
+        right: (c, 3).
+        found: (n, 3), of which these rows are written.
+    """
+    for row in rows:
+        x = y = z = 0.0
+        for k in range(starts[row], starts[row + 1]):
+            value, at = values[k], columns[k]
+            x += value * right[at, 0]
+            y += value * right[at, 1]
+            z += value * right[at, 2]
+        found[row, 0], found[row, 1], found[row, 2] = x, y, z
+
+
 @njit(**COMPILED, fastmath={"contract", "nsz"})
 def sparse_product(matrix: Any, right: Any, found: Any) -> None:
     """Product of a matrix (m, m), most of which is zero, and `right` (m, q), to `found` (m, q)."""
