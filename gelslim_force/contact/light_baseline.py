@@ -40,9 +40,9 @@ def without_baseline(change: Layers, valid: Mask, noise_level: Layers) -> Layers
     some = used[:: max(1, len(used) // _SAMPLE)]
     seen, scale = (a.reshape(len(change), -1)[:, some] for a in (change, noise_level))
     middle, spread = _middle_and_spread(seen, scale)
-    places = _places(valid.shape, some)
-    steep = _has_trend(seen, spread * scale, places)
+    steep = _has_trend(seen, spread, scale, np.divmod(some, valid.shape[1]))
     if steep.any():
+        places = _places(valid.shape, some)
         plane = _planes(seen[steep], scale[steep], places).astype(change.dtype)
         # Two axes of the picture instead of a place for each of its bins.
         y, x = (np.linspace(-1, 1, n, dtype=change.dtype) for n in valid.shape)
@@ -56,8 +56,11 @@ def without_baseline(change: Layers, valid: Mask, noise_level: Layers) -> Layers
 
 def _middle_and_spread(seen: Layers, scale: Layers) -> tuple[Layers, Layers]:
     """(c, 1) medians of rows (c, n), and standard deviations over those of `scale`."""
-    middle = _middles(seen)
-    return middle, ROBUST * _middles(np.abs(seen - middle) / scale)
+    from gelslim_force.contact.baseline_kernel import middle_and_spread
+
+    middle, spread = np.empty((2, len(seen), 1), dtype=seen.dtype)
+    middle_and_spread(seen, scale, ROBUST, middle, spread)
+    return middle, spread
 
 
 def _places(shape: tuple[int, ...], some: NDArray[np.intp]) -> NDArray[np.float64]:
@@ -67,17 +70,24 @@ def _places(shape: tuple[int, ...], some: NDArray[np.intp]) -> NDArray[np.float6
     return np.stack([np.ones(len(some)), across, down])
 
 
-def _has_trend(seen: Layers, sigma: Layers, places: NDArray[np.float64]) -> Mask:
-    """(c,) layers whose medians in opposite halves of the pad differ, by a part of the bins."""
-    seen, places = seen[:, ::_THINNED], places[:, ::_THINNED]
+def _has_trend(
+    seen: Layers, spread: Layers, scale: Layers, places: tuple[NDArray[np.intp], ...]
+) -> Mask:
+    """(c,) layers whose medians in opposite halves of the pad differ, by a part of the bins.
+
+    Args:
+        seen: (c, n).
+        spread: (c, 1) standard deviation over `scale`.
+        scale: (c, n).
+        places: Rows and columns (n,) of the bins.
+    """
+    from gelslim_force.contact.baseline_kernel import halves_differ
+
     found = np.zeros(len(seen), dtype=bool)
-    usual = sigma[:, ::_THINNED].mean(axis=1)
-    for place in places[1:]:
-        first = place < place.mean()
-        if first.all() or not first.any():
-            continue
-        apart = np.abs(_middles(seen[:, first]) - _middles(seen[:, ~first]))[:, 0]
-        found |= apart > _LEAST_TREND * usual
+    thin = slice(None, None, _THINNED)
+    some, scale = (np.ascontiguousarray(a[:, thin]) for a in (seen, scale))
+    for place in places:
+        halves_differ(some, spread, scale, place[thin], _LEAST_TREND, found)
     return found
 
 
@@ -96,9 +106,3 @@ def _planes(seen: Layers, scale: Layers, places: NDArray[np.float64]) -> NDArray
         left = np.abs(seen - plane[..., 0] @ places) / scale
         weight = 1 / (np.maximum(left, least) * np.square(scale))
     return np.asarray(plane[..., 0])
-
-
-def _middles(rows: Layers) -> Layers:
-    """(c, 1) upper medians."""
-    half = rows.shape[1] // 2
-    return np.partition(rows, half, axis=1)[:, half : half + 1]

@@ -114,15 +114,13 @@ class ShadingReference:
         self._opposed = opposed
         self._radius = radius_px
         self._coloured = not is_grey(self.image)
-        from gelslim_force.contact.shading_kernel import bin_sums, block_discs
+        from gelslim_force.contact.shading_kernel import FREE, block_discs, glaring_bins
 
-        self._blocked = np.zeros((height, width), dtype=np.uint8)
-        self._touched = np.zeros(self.shape, dtype=np.uint8)
-        block_discs(self._blocked, markers_px, radius_px, bin_px, self._touched)
-        self._scratch = np.empty_like(self._blocked), np.empty_like(self._touched)
-        self._sums = np.zeros((2, *self.shape, channels), dtype=np.int64)
+        self._mask = np.full((height, width), FREE, dtype=np.uint8)
+        block_discs(self._mask, np.asarray(markers_px, dtype=float), radius_px)
+        self._scratch = np.empty_like(self._mask)
         self._glaring = np.zeros((2, *self.shape), dtype=np.uint8)
-        bin_sums(self.image, bin_px, self._sums[0], self._glaring[0])
+        glaring_bins(self.image, bin_px, self._glaring[0])
         self._ratios = np.ones((channels, *self.shape), dtype=np.float32)
         self._counts = np.zeros(self.shape, dtype=np.int64)
         levels = self.levels()
@@ -141,7 +139,7 @@ class ShadingReference:
         rows, columns = self.shape
         size = self.bin_px
         cut = slice(0, rows * size), slice(0, columns * size)
-        free = (self._blocked[cut] == 0).astype(np.float32)
+        free = (self._mask[cut] != 0).astype(np.float32)
 
         def summed(picture: NDArray[np.float32]) -> NDArray[np.float32]:
             return picture.reshape(rows, size, columns, size).sum(axis=(1, 3))
@@ -164,7 +162,7 @@ class ShadingReference:
         Raises ValueError for an image of another shape, LostColourError for a grey one where the
         reference has colour.
         """
-        from gelslim_force.contact.shading_kernel import bin_sums, block_discs, light_ratios
+        from gelslim_force.contact.shading_kernel import block_discs, glaring_bins, light_ratios
 
         picture = as_picture(image)
         if picture.shape != self.image.shape:
@@ -177,20 +175,18 @@ class ShadingReference:
                 "the picture is grey, the reference has colour, and contacts show by the colours: "
                 "set the camera to colour"
             )
-        blocked, touched = self._scratch
-        np.copyto(blocked, self._blocked)
-        np.copyto(touched, self._touched)
+        mask = self._scratch
+        np.copyto(mask, self._mask)
         if markers_px is not None and len(markers_px):
             radius = radius_px
             if radius is None:
                 radius = np.full(len(markers_px), float(np.median(self._radius)))
-            block_discs(blocked, np.asarray(markers_px, dtype=float), radius, self.bin_px, touched)
-        bin_sums(picture, self.bin_px, self._sums[1], self._glaring[1])
+            block_discs(mask, np.asarray(markers_px, dtype=float), radius)
+        glaring_bins(picture, self.bin_px, self._glaring[1])
         glaring = self._glaring[0] | self._glaring[1]
         # The constant keeps a channel that turns black from dominating all others.
         light_ratios(
-            self.image, picture, blocked, touched, glaring, self.bin_px, self._sums, FLOOR,
-            self._ratios, self._counts,
+            self.image, picture, mask, glaring, self.bin_px, FLOOR, self._ratios, self._counts,
         )  # fmt: skip
         free = (self._counts >= LEAST_FREE * self.bin_px**2) & ~self._soiled()
         noise_level = self._noise_level * self._by_free[self._counts]
@@ -213,9 +209,17 @@ class ShadingReference:
             return np.zeros(self.shape, dtype=bool)
         seen = self._counts > 0
         brightest = self._ratios[self.used].max(axis=0)
-        usual = np.median(brightest[seen & self.on_pad]) if (seen & self.on_pad).any() else 1.0
+        usual = _median(brightest[seen & self.on_pad])
         dark = seen & (brightest < _OPAQUE * usual)
         return np.asarray(binary_dilation(dark, np.ones((3, 3)))) if dark.any() else dark
+
+
+def _median(values: NDArray[np.float32]) -> np.float32:
+    """The median of values (n,), as `np.median` gives it in three times the time; 1 without any."""
+    if not len(values):
+        return np.float32(1.0)
+    middle = (len(values) - 1) // 2, len(values) // 2
+    return np.float32(np.partition(values, middle)[list(middle)].mean())
 
 
 def is_grey(picture: NDArray[np.uint8]) -> bool:

@@ -27,6 +27,7 @@ from scipy import sparse
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.elements.skin import Membrane
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError, NeoHookeanPad
+from ifem_export.operators.layer_coupling import LayerCoupling
 from ifem_export.operators.pad_system import PadSystem, checked_field
 from ifem_export.operators.solver import ConvergenceError, Solver, inner_solver
 
@@ -84,6 +85,11 @@ class FiniteStrainForce:
         return NeoHookeanPad(self.bundle.mesh, self.bundle.material)
 
     @cached_property
+    def coupling(self) -> LayerCoupling:
+        """Of the surface and the nodes below it, in a linear pad of several layers."""
+        return LayerCoupling(self.system)
+
+    @cached_property
     def inner(self) -> Solver:
         """Solver of the inner nodes."""
         return inner_solver(self.system, "iterative")
@@ -139,8 +145,7 @@ class FiniteStrainForce:
             done = residuals[-1] <= self.tolerance * size or size == 0.0
             step = self.inner_step(-residual.reshape(-1), done)
             if done:
-                condensed = self.system.inner_to_surface @ step
-                return HeldPad(np.asarray(force + condensed.reshape(-1, 3)), motion)
+                return HeldPad(np.asarray(force + self.coupling.from_inner(step)), motion)
             motion[inside] = anderson.next(motion[inside].reshape(-1), step).reshape(-1, 3)
         shown = ", ".join(f"{t:.2g}" for t in residuals)
         raise ConvergenceError(
@@ -151,8 +156,7 @@ class FiniteStrainForce:
 
     def _extension(self, u: Array) -> Array:
         """Motion (m, 3) of the inner nodes of a linear pad whose surface moves by u (c, 3)."""
-        coupling = self.system.surface_to_inner @ u.reshape(-1)
-        return self.inner_step(-coupling).reshape(-1, 3)
+        return self.inner_step(self.coupling.on_inner(-u)).reshape(-1, 3)
 
     def inner_step(self, force_n: Array, last: bool = False) -> Array:
         """Motion (3m,) of the inner nodes of a linear pad under forces (3m,) on them."""

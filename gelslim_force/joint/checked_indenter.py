@@ -19,6 +19,7 @@ from gelslim_force.contact.normal_motion import IndenterSource
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch
 from gelslim_force.joint.fit_state import JointForces
+from gelslim_force.joint.rounds import Steps
 from gelslim_force.joint.unknown_shape import LARGEST_UNEXPLAINED, UnknownShape
 
 Array = NDArray[np.float64]
@@ -28,6 +29,10 @@ _MODEL_ERROR = 0.15
 """Error of the named indenter's force by outline, mesh and friction, over the larger force."""
 _FRAMES = 10
 """Frames of a contact after which it is compared again."""
+_SOLUTIONS = 2
+"""Of the unknown shape in each frame of a comparison that goes on over several, the look at the
+light being the first. A comparison ends in the frame after the one that it is of, or in the next
+but one."""
 _GROWN = 0.1
 """Change of the patch's size from which it is compared before that."""
 _ANOTHER = (
@@ -58,6 +63,34 @@ class SeenIndenter:
     shown: Mask | None
 
 
+@dataclass(eq=False)
+class _Comparison:
+    """A comparison that goes on over several frames.
+
+    Attributes:
+        seen: The frame that it is of.
+        steps: Look for its forces.
+        reading: What the named indenter reads in it; None where that is not known.
+        witness: The forces found, as in `SeenIndenter`.
+        ended: Whether they are.
+    """
+
+    seen: SeenIndenter
+    steps: Steps[JointForces | str | None]
+    reading: NormalReading | None = None
+    witness: JointForces | str | None = None
+    ended: bool = False
+
+    def go_on(self) -> None:
+        """The solutions of one frame."""
+        for _ in range(_SOLUTIONS):
+            try:
+                next(self.steps)
+            except StopIteration as end:
+                self.witness, self.ended = end.value, True
+                return
+
+
 @dataclass(frozen=True)
 class _Verdict:
     """Why the indenter is not the one named, empty if it may be; whether no contact is seen."""
@@ -70,7 +103,8 @@ class CheckedIndenter:
     """`NormalSource` of a named indenter that another one confirms.
 
     It compares the forces in the first frame of a contact, when the patch grows or shrinks, and
-    every ten frames; the verdict holds in between.
+    every ten frames; the verdict holds in between. What may be another contact is judged at once.
+    The work of the comparison every ten frames is spread over the frames after it, always alike.
 
     Attributes:
         named: The named indenter.
@@ -85,6 +119,7 @@ class CheckedIndenter:
         """Forget the last frame."""
         self.witness.reset()
         self._size_mm, self._age, self._verdict = 0.0, 0, _Verdict()
+        self._running: _Comparison | None = None
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenIndenter | str | None:
         """The patch of a frame whose markers are at (n, 2), and what is compared with it.
@@ -95,20 +130,33 @@ class CheckedIndenter:
         if patch is None or isinstance(patch, str):
             self.reset()
             return patch
-        changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
-        self._age += 1
         lost = bool(np.isnan(markers_px).any())
         shown = self.witness.estimator.shown(image, markers_px) if lost else None
-        if not changed and self._age < _FRAMES:
-            return SeenIndenter(patch, None, False, shown)
-        self._size_mm, self._age = patch.size_mm, 0
-        return SeenIndenter(patch, self.witness.look(image, markers_px), True, shown)
+        changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
+        self._age += 1
+        if self._running is not None and self._running.ended:
+            self._running = None
+        if changed:
+            self._size_mm, self._age, self._running = patch.size_mm, 0, None
+            return SeenIndenter(patch, self.witness.look(image, markers_px), True, shown)
+        seen = SeenIndenter(patch, None, False, shown)
+        if self._age >= _FRAMES:
+            self._size_mm, self._age = patch.size_mm, 0
+            self._running = _Comparison(seen, self.witness.looking(image, markers_px))
+        if self._running is not None:
+            self._running.go_on()
+        return seen
 
     def motion(self, seen: Any, lateral_mm: Array | None = None) -> NormalReading:
         """Motion under the named indenter; unknown where it is not the one that touches."""
         if not isinstance(seen, SeenIndenter):
             return self.named.motion(seen, lateral_mm)
         reading = self.named.motion(seen.patch, lateral_mm)
+        running = self._running
+        if running is not None and running.seen is seen and reading.known:
+            running.reading = reading
+        if running is not None and running.ended and running.reading is not None:
+            self._verdict = self._compared(running.reading, running.witness)
         if not reading.known:
             return reading
         if seen.compared:

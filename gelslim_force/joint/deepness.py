@@ -6,8 +6,6 @@ light, and pressures differ more from node to node.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,13 +25,14 @@ def deepness(height_mm: Array, deep_mm: float) -> float:
     return min(max((depth / deep_mm - 1.0) / (FULLY - 1.0), 0.0), 1.0)
 
 
-def settings_at(settings: JointSettings, deep: float) -> JointSettings:
-    """The settings of a contact between shallow, 0, and deep, 1."""
-    if deep == 0.0:
-        return settings
-    light = (1 - deep) * settings.light_share + deep * settings.deep_light_share
-    least = (1 - deep) * settings.least_pressure + deep * settings.deep_least_pressure
-    return replace(settings, light_share=light, least_pressure=least)
+def light_share_at(settings: JointSettings, deep: float) -> float:
+    """The share of the light of a contact between shallow, 0, and deep, 1."""
+    return (1 - deep) * settings.light_share + deep * settings.deep_light_share
+
+
+def least_pressure_at(settings: JointSettings, deep: float) -> float:
+    """The least pressure of a contact between shallow, 0, and deep, 1."""
+    return (1 - deep) * settings.least_pressure + deep * settings.deep_least_pressure
 
 
 def traction_sigma_mpa(

@@ -11,7 +11,7 @@ and the forces follow from the markers alone.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gelslim_force.joint.deepness import deepness, settings_at, traction_sigma_mpa
+from gelslim_force.joint.deepness import (
+    deepness,
+    least_pressure_at,
+    light_share_at,
+    traction_sigma_mpa,
+)
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointForces, SoughtForces
@@ -33,9 +38,9 @@ from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
 from gelslim_force.joint.normal_equations import TOLERANCE, Linearised, NormalEquations
 from gelslim_force.joint.off_design import OffDesign
-from gelslim_force.joint.refinement import refined
-from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes, rise_of
+from gelslim_force.joint.region import contact_nodes, pressing_nodes, rise_of
 from gelslim_force.joint.responses import Responses
+from gelslim_force.joint.rounds import Steps, finished, solutions
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.strained_gel import Excess, StrainedGel
 from gelslim_force.motion.marker_motion import MarkerRays, MarkerView
@@ -50,13 +55,6 @@ _MARKER_LIMIT = 3.0
 _LEAST_NODES, _CLOSE = 3, 1
 """The latter: steps about the contact within which heights at half the pitch count."""
 _ROUGH_TOLERANCE = 2e-4  # of forces on the nodes that those at half the pitch follow
-_SETTLED, _FAR, _LOST = 0.01, 0.2, 0.03
-"""Shares of the force. A change below the first one ends the linearisations. One more is needed for
-a change above the second one since the last frame, and if nodes with the third one are left out."""
-_HELD_SLOPE = 0.07
-"""Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
-random contacts then differ from those of another linearisation by 0.03 standard deviations in the
-median, and the root mean square of their errors against the truth by 2 % at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,85 +129,25 @@ class JointEstimator:
         Raises:
             IfemError: The strained law does not converge.
         """
+        return finished(self.steps(frame, last))
+
+    def steps(self, frame: FrameData, last: JointForces | None = None) -> Steps[JointForces | None]:
+        """`estimate`, which stops before each solution."""
         region = self._region(frame)
         if region.sum() < _LEAST_NODES:
             return None
-        if last is None or not (last.region & region).any():
-            start = FitState.at_rest(self.responses, len(self.points_mm))
-            begun = self._rounds(frame, region, start, self.settings.rounds)
-        else:
-            begun = last.region, last.state
-            if is_new_contact(region, last.seen, self.lattice):
-                begun = self._rounds(frame, region, begun[1], self.settings.rounds)
-        nodes = region & self.lattice.widened(begun[0], 1)
-        nodes, state = self._last_rounds(frame, nodes, begun[1])
+        nodes, state = yield from solutions(self, frame, region, last)
         return self._found(frame, region, nodes, state)
 
-    def _last_rounds(self, frame: FrameData, nodes: Mask, state: FitState) -> tuple[Mask, FitState]:
-        """`following_rounds`; the last one is at half the pitch where that is asked for."""
-        rounds = self.settings.following_rounds
-        if self.pressure is None or frame.seen is None:
-            return self._rounds(frame, nodes, state, rounds)
-        begun = state
-        for _ in range(rounds[0]):
-            state = self._round(frame, np.flatnonzero(nodes), state)
-        if is_far := not state.near(begun, _FAR):
-            state = self._round(frame, np.flatnonzero(nodes), state)
-        nodes = self._pressing(nodes, state)
-        too_deep = state.depth_mm > self.finer_to_mm
-        if too_deep or (self.deepness(state) > 0 and is_far):
-            nodes, state = self._rounds(frame, nodes, state, rounds[1:])
-        elif self.deepness(state) > 0 and state.share_beside(nodes) > _LOST:
-            state = self._round(frame, np.flatnonzero(nodes), state)
-        return nodes, state if too_deep else refined(self, frame, np.flatnonzero(nodes), state)
-
-    def _pressing(self, nodes: Mask, state: FitState) -> Mask:
+    def pressing(self, nodes: Mask, state: FitState) -> Mask:
         """Those of the nodes (c,) that press in an estimate, and what they enclose."""
         pressure = -state.force_n[:, 2] / self.area_mm2
-        least = settings_at(self.settings, self.deepness(state)).least_pressure
+        least = least_pressure_at(self.settings, self.deepness(state))
         return pressing_nodes(nodes, pressure, self.neighbours, least)
 
     def shown(self, image: NDArray[np.uint8], markers_px: Array) -> Mask:
         """(c,) nodes whose slope the light of a frame shows; arguments and errors as in `frame`."""
         return self._shown(None if self.light is None else self.light.look(image, markers_px))
-
-    def _rounds(
-        self, frame: FrameData, nodes: Mask, state: FitState, rounds: tuple[int, ...]
-    ) -> tuple[Mask, FitState]:
-        wider = None
-        for number, count in enumerate(rounds):
-            if number > 0:
-                wider = state.force_n
-                nodes = self._pressing(nodes, state)
-                held = self._held(state, np.flatnonzero(nodes))
-                if held is not None:
-                    state, count = held, count - 1
-            for _ in range(count):
-                state = self._round(frame, np.flatnonzero(nodes), state)
-        return nodes, replace(self._settled(frame, nodes, state), wider_n=wider)
-
-    def _held(self, state: FitState, nodes: Nodes) -> FitState | None:
-        """The forces on fewer nodes by the linear data of the last round.
-
-        None where the gel moves so far that these do not hold, and for deep contacts.
-        """
-        if state.data is None or self.deepness(state) > 0:
-            return None
-        data = state.data.on(nodes)
-        found = self._solved(data)
-        slope = np.abs(found.displacement_mm - data.moved_mm).max() / self.lattice.step_mm.min()
-        if slope > _HELD_SLOPE:
-            return None
-        # As in every round, residuals are those of the forces before it.
-        return replace(found, markers=data.markers.after(state.force_n[nodes].ravel() - data.start))
-
-    def _settled(self, frame: FrameData, nodes: Mask, state: FitState) -> FitState:
-        """A deep contact after as many more linearisations as it needs."""
-        for _ in range(self.settings.deep_rounds if self.deepness(state) > 0 else 0):
-            before, state = state, self._round(frame, np.flatnonzero(nodes), state)
-            if state.near(before, _SETTLED):
-                break
-        return state
 
     def deepness(self, state: FitState) -> float:
         """From 0 to 1, of the contact of an estimate."""
@@ -232,9 +170,9 @@ class JointEstimator:
         lateral = self.markers.lateral_motion(frame.markers.positions_px)
         return self.moved.nodes(lateral, frame.noise_mm, self.settings.marker_mm)
 
-    def _round(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
-        """Linearise at the state, and solve."""
-        return self._solved(self._linearised(frame, nodes, state))
+    def solution(self, frame: FrameData, nodes: Nodes, state: FitState) -> FitState:
+        """Linearise at the state, and solve for forces on nodes (p,)."""
+        return self.solved(self._linearised(frame, nodes, state))
 
     def _linearised(self, frame: FrameData, nodes: Nodes, state: FitState) -> Linearised:
         """The data near the contact, linear about the state."""
@@ -252,7 +190,7 @@ class JointEstimator:
         about = nodes, start, moved, excess, state.gain, deep
         return Linearised(*about, data, markers, light, heights)
 
-    def _solved(self, data: Linearised) -> FitState:
+    def solved(self, data: Linearised) -> FitState:
         """The forces that the linear data and the prior give."""
         chosen, nodes, young = self.settings, data.nodes, self.youngs_modulus_mpa
         area = self.area_mm2[nodes]
@@ -294,21 +232,20 @@ class JointEstimator:
 
         What is not resolved: a share of the motion of all, and of each marker's `bending`.
         """
+        from gelslim_force.joint.kernels.fit_kernel import sparse_rows
+
         chosen = self.settings
         wide = self.lattice.widened(near, chosen.marker_reach)
         used = np.flatnonzero(wide[self.marker_node] & frame.markers.known)
-        model, bent = np.vsplit(self._to_markers @ moved_mm, 2)
+        model, bent = np.empty((2, len(self.markers), 3))
+        for matrix, found in ((self.nodes_to_markers, model), (self.bending, bent)):
+            sparse_rows(matrix.indptr, matrix.indices, matrix.data, used, moved_mm, found)
         lateral = frame.markers.lateral(used, model[used, 2])
-        rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
+        rows = self.responses.of_markers(np.flatnonzero(near), used)
         share = chosen.marker_share * rms_length(model[used])
         errors = math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT
         motion = model, bent, self.by_height, frame.noise_mm
         return MarkerRows.of(used, rows, lateral, motion, errors)
-
-    @cached_property
-    def _to_markers(self) -> sparse.csr_array:
-        """(2n, c) `nodes_to_markers` over `bending`."""
-        return sparse.csr_array(sparse.vstack([self.nodes_to_markers, self.bending]))
 
     def light_sums(
         self, frame: FrameData, near: Mask, moved_mm: Array, state: FitState, finer_mm: Any = None
@@ -327,8 +264,8 @@ class JointEstimator:
         close = None if finer_mm is None else self.lattice.widened(near, _CLOSE)
         at = self.light, frame.seen, self.lattice, moved_mm, wide
         bins = placed_bins(*at, relief, finer, close)
-        chosen = settings_at(self.settings, self.deepness(state))
-        error = math.hypot(chosen.light_error, chosen.light_share * rms_length(bins.change.T))
+        share = light_share_at(self.settings, self.deepness(state))
+        error = math.hypot(self.settings.light_error, share * rms_length(bins.change.T))
         height = moved_mm[:, 2] if finer_mm is None else finer_mm
         return bins.sums(self.law, height, state.gain, error)
 

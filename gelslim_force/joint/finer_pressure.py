@@ -151,20 +151,18 @@ class FinerPressure:
         rough = self.in_parts(responses.of_heights(parts.bearing, seen), parts)
         found = np.empty((len(near), parts.size), dtype=rough.dtype)
         interpolated_rows(*entries, interpolation.data, near, row, rough, found)
-        number = np.full(len(lattice.place), -1, dtype=np.intp)
-        number[near] = np.arange(len(near))
-        at = lattice.place[parts.places]
+        seen_at, at = lattice.place[near], lattice.place[parts.places]
         alone = (parts.source == parts.source[:, :1]).all(axis=1)
         for stencil, some in self._by_stencil(at):
             for own, width in ((alone[some], 1), (~alone[some], 4)):
                 which = some[own]
                 columns = np.ascontiguousarray(parts.source[which, :width])
-                stencil_columns(stencil[..., 2], at[which], lattice.number, number, columns, found)
+                stencil_columns(stencil[..., 2], at[which], seen_at, columns, found)
         at = self.surface.place[parts.nodes]
         for axis in (0, 1):
             columns = parts.tangential[axis::2, None]
             stencil = self.surface.stencil[..., axis]
-            stencil_columns(stencil, at, lattice.number, number, columns, found)
+            stencil_columns(stencil, at, seen_at, columns, found)
         return found
 
     def in_parts(self, rows: Any, parts: PressureParts) -> Any:

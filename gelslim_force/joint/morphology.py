@@ -25,8 +25,10 @@ def narrowed(picture: Mask, steps: int) -> Mask:
 
 def closed(picture: Mask, steps: int) -> Mask:
     """Without gaps up to twice `steps` wide; the outside does not narrow it at the edge."""
-    wide = np.pad(picture, 2 * steps)
-    inner = slice(2 * steps, -2 * steps)
+    edge = 2 * steps
+    wide = np.zeros([n + 2 * edge for n in picture.shape], dtype=bool)
+    inner = slice(edge, -edge)
+    wide[inner, inner] = picture
     return narrowed(widened(wide, steps), steps)[inner, inner]
 
 

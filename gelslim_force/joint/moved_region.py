@@ -41,7 +41,6 @@ class MovedRegion:
 
     Args:
         responses: Of the markers to nodal forces.
-        by_height: (n, 2) lateral motion that a picture shows per mm less of a marker's height.
         area_mm2: (c,) shares of the nodes in the surface.
         neighbours: (c, c) with 1 where nodes share an edge of a cell.
         lattice: The lattice of the nodes.
@@ -51,15 +50,14 @@ class MovedRegion:
     def __init__(
         self,
         responses: Responses,
-        by_height: Array,
         area_mm2: Array,
         neighbours: sparse.csr_array,
         lattice: NodeLattice,
         youngs_modulus_mpa: float,
     ) -> None:
         self._lattice = lattice
-        nodes, markers = len(area_mm2), len(by_height)
-        rows = responses.of_markers(np.arange(nodes), np.arange(markers), by_height)
+        nodes, markers = len(area_mm2), responses.markers
+        rows = responses.of_markers(np.arange(nodes), np.arange(markers))
         seen = rows.astype(float).reshape(2 * markers, nodes, 3) / area_mm2[:, None]
         laplacian = sparse.diags_array(neighbours.sum(axis=1)) - neighbours
         stiff = laplacian / (ROUGHNESS * youngs_modulus_mpa) ** 2

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from gelslim_force.joint.morphology import filled, widened
+from gelslim_force.joint.morphology import filled
 from ifem_export.markers.interpolation import marker_to_node
 
 Array = NDArray[np.float64]
@@ -47,31 +47,28 @@ class SlopeTaps:
         return found
 
     def on_deformed(self, lateral_mm: Array) -> SlopeTaps:
-        """The slopes of the deformed surface, whose nodes have moved by (c, 2) in its plane.
-
-        With the deformation gradient F = I + ∂u/∂x of the plane, they are F⁻ᵀ times the slopes by
-        the places at rest. F is taken with a determinant of at least 0.3.
-        """
-        from gelslim_force.joint.kernels.place_kernel import turn_taps
-
-        along, across = np.empty_like(self.along), np.empty_like(self.across)
-        turn_taps(self.nodes, self.along, self.across, lateral_mm, _LEAST_AREA, along, across)
-        return SlopeTaps(self.nodes, along, across)
+        """The slopes of the deformed surface, whose nodes have moved by (c, 2) in its plane."""
+        return self.turned(self.turn(lateral_mm))
 
     def turned(self, turn: Array) -> SlopeTaps:
         """The slopes times matrices (n, 2, 2)."""
         from gelslim_force.joint.kernels.place_kernel import turn_slopes
 
-        along, across = self.along.copy(), self.across.copy()
-        turn_slopes(along, across, turn)
+        along, across = np.empty_like(self.along), np.empty_like(self.across)
+        turn_slopes(self.along, self.across, turn, along, across)
         return SlopeTaps(self.nodes, along, across)
 
     def turn(self, lateral_mm: Array) -> Array:
-        """(n, 2, 2) F⁻ᵀ of `on_deformed`."""
-        along, across = (self.slopes(lateral_mm[:, axis]) for axis in (0, 1))
-        xx, xy, yx, yy = 1 + along[:, 0], along[:, 1], across[:, 0], 1 + across[:, 1]
-        size = np.maximum(xx * yy - xy * yx, _LEAST_AREA)
-        return np.stack([yy, -yx, -xy, xx], axis=1).reshape(-1, 2, 2) / size[:, None, None]
+        """(n, 2, 2) F⁻ᵀ, which leads from slopes by the places at rest to those when deformed.
+
+        F = I + ∂u/∂x is the deformation gradient of the plane, whose nodes have moved by (c, 2). It
+        is taken with a determinant of at least 0.3.
+        """
+        from gelslim_force.joint.kernels.place_kernel import plane_turns
+
+        found = np.empty((len(self.nodes), 2, 2))
+        plane_turns(self.nodes, self.along, self.across, lateral_mm, _LEAST_AREA, found)
+        return found
 
 
 def _cubic_weights(part: Array) -> Array:
@@ -211,8 +208,12 @@ class NodeLattice:
         """(c,) the nodes and those up to `rings` steps along the lattice away."""
         if rings < 1:
             return nodes
-        wide = widened(self.picture(nodes), rings)
-        return np.asarray(wide[self.place[:, 0], self.place[:, 1]])
+        from gelslim_force.joint.kernels.region_kernel import widen_nodes
+
+        found = np.empty(len(nodes), dtype=bool)
+        distance = np.empty(self.number.shape, dtype=np.int64)
+        widen_nodes(nodes, self.place, rings, distance, found)
+        return found
 
     def place_number(self, points_mm: Array) -> Nodes:
         """(n,) number, row by row, of the place nearest to each point (n, 2); -1 beyond them."""

@@ -29,8 +29,6 @@ Nodes = NDArray[np.intp]
 STEPS = 400
 TOLERANCE = 1e-4
 _MARGIN = 1.05
-_BLOCK = 64
-"""Rows of a banded product that are multiplied together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +60,16 @@ class NormalEquations:
             heights: (m, 3p) heights per force.
             gain: Expected change of the gain, and its standard deviation.
         """
-        from gelslim_force.joint.kernels.fit_kernel import add_light
+        from gelslim_force.joint.kernels.fit_kernel import add_light, sparse_product
 
         expected, sigma = gain
         own = light.by_gain + sigma**-2
         seen = (light.gain_pull + expected / sigma**2) / own
         sums = np.column_stack([light.pull - light.mixed * seen, light.mixed])
         pull, mixed = (heights.T @ sums.astype(heights.dtype)).T.astype(float)
-        product = _banded_product(light.matrix.astype(heights.dtype), heights)
+        # Heights of nodes that are far apart share no bin.
+        product = np.empty_like(heights)
+        sparse_product(light.matrix.astype(heights.dtype), heights, product)
         hessian = np.empty_like(self.hessian)
         half = len(mixed) // 2
         gram = np.empty(hessian.shape, dtype=heights.dtype)
@@ -202,22 +202,6 @@ class Linearised:
             step=step,
             free=free,
         )
-
-
-def _banded_product(matrix: Any, right: Any) -> Any:
-    """Product of a symmetric matrix (m, m) and (m, q) without most of what is zero.
-
-    Heights of nodes that are far apart share no bin: only a band of the matrix is not zero.
-    """
-    from gelslim_force.joint.kernels.fit_kernel import half_width
-
-    size = len(matrix)
-    width, found = half_width(matrix), np.empty_like(right)
-    for first in range(0, size, _BLOCK):
-        last = min(first + _BLOCK, size)
-        band = slice(max(0, first - width), min(size, last + width))
-        np.matmul(matrix[first:last, band], right[band], out=found[first:last])
-    return found
 
 
 def huber(residual: Array, sigma: Array, limit: float) -> Array:

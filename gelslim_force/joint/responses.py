@@ -22,33 +22,36 @@ class Responses:
     Args:
         compliance: Of the pad's surface.
         nodes_to_markers: (n, c) interpolation.
+        by_height: (n, 2) lateral motion that a picture shows per mm less of a marker's height.
     """
 
-    def __init__(self, compliance: SurfaceCompliance, nodes_to_markers: Any) -> None:
+    def __init__(
+        self, compliance: SurfaceCompliance, nodes_to_markers: Any, by_height: Array
+    ) -> None:
         self.compliance = compliance
         self._to_markers = nodes_to_markers
+        self._by_height = by_height.astype(np.float32)
         markers, nodes = nodes_to_markers.shape
-        self._markers = np.zeros((markers, 3, nodes, 3), dtype=np.float32)
+        self._markers = np.zeros((markers, 2, nodes, 3), dtype=np.float32)
         self._heights = np.zeros((nodes, nodes, 3), dtype=np.float32)
         self._made = np.zeros(nodes, dtype=bool)
+
+    @property
+    def markers(self) -> int:
+        """Number of markers n."""
+        return len(self._markers)
 
     def prepare(self) -> None:
         """Compute all columns now, so that no frame waits for them."""
         self._make(np.arange(len(self._made)))
 
-    def of_markers(self, nodes: Nodes, markers: Nodes, by_height: Array) -> Single:
-        """(2n, 3p) what a picture shows of the motion of markers under forces on nodes (p,).
-
-        Args:
-            nodes: (p,).
-            markers: (n,) those used.
-            by_height: (n, 2) lateral motion that the picture shows per mm less of height.
-        """
+    def of_markers(self, nodes: Nodes, markers: Nodes) -> Single:
+        """(2m, 3p) motion of markers (m,) as a picture shows it, under forces on nodes (p,)."""
         from gelslim_force.joint.kernels.light_kernel import gather_markers
 
         self._make(nodes)
         rows = np.empty((2 * len(markers), 3 * len(nodes)), dtype=np.float32)
-        gather_markers(self._markers, markers, nodes, by_height.astype(np.float32), rows)
+        gather_markers(self._markers, markers, nodes, rows)
         return rows
 
     def of_heights(self, nodes: Nodes, near: Nodes) -> Single:
@@ -70,7 +73,8 @@ class Responses:
             part = missing[first : first + _BATCH]
             columns = self.compliance.columns(part)
             flat = columns.transpose(2, 0, 1, 3).reshape(columns.shape[2], -1)
-            moved = (self._to_markers @ flat).reshape(-1, len(part), 3, 3)
-            self._markers[:, :, part] = moved.transpose(0, 3, 1, 2)
+            moved = (self._to_markers @ flat).reshape(-1, len(part), 3, 3).transpose(0, 3, 1, 2)
+            lean = self._by_height[:, :, None, None]
+            self._markers[:, :, part] = moved[:, :2] - lean * moved[:, 2:].astype(np.float32)
             self._heights[:, part] = columns[..., 2].transpose(2, 0, 1)
             self._made[part] = True

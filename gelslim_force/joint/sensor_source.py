@@ -90,7 +90,7 @@ def unknown_shape(
     lattice = NodeLattice.of(points_mm, cell_mm)
     heights_mm = marker_heights_mm(bundle)[followed.markers]
     view = MarkerView(calibration.camera, followed.positions_px, heights_mm)
-    to_markers = marker_to_node(points_mm, view.rest_mm)
+    to_markers, by_height = marker_to_node(points_mm, view.rest_mm), view.by_height()
     seen = None
     if reference is not None:
         seen = _light_view(bundle, calibration, reference, lattice, light)
@@ -100,12 +100,12 @@ def unknown_shape(
         surface_share_mm2(bundle.mesh),
         neighbour_matrix(points_mm, cell_mm),
         lattice,
-        Responses(SurfaceCompliance(bundle, skin=skin), to_markers),
+        Responses(SurfaceCompliance(bundle, skin=skin), to_markers, by_height),
         view,
         to_markers,
         lattice.interpolation(view.rest_mm) - to_markers,
         lattice.nearest_node(view.rest_mm[:, :2]),
-        view.by_height(),
+        by_height,
         seen,
         None if seen is None else LightLaw.of(_traced(bundle), chosen.gamma),
         bundle.material.youngs_modulus_mpa,
@@ -166,7 +166,6 @@ def _traced(bundle: Bundle) -> LightMap:
 def _moved_region(estimator: JointEstimator) -> MovedRegion:
     return MovedRegion(
         estimator.responses,
-        estimator.by_height,
         estimator.area_mm2,
         estimator.neighbours,
         estimator.lattice,

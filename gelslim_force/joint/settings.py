@@ -164,6 +164,7 @@ MARKERS_ALONE = JointSettings(
 """Without light: markers show the region less sharply, so that more nodes have to be removed, and
 what the region leaves open is as large as 4 µm at the markers. A narrow limit of the shear is what
 tells the region, on any mesh: with a wide one, real presses are found twice as wide."""
-WITNESS = replace(ON_NODES, bending_share=0.0)
+WITNESS = replace(ON_NODES, bending_share=0.0, rounds=(1,))
 """To confirm a named indenter. Its dent bends nowhere sharply between two nodes; that doubt would
-hide that something else touches the gel."""
+hide that something else touches the gel. A new contact takes three solutions instead of five: its
+normal force differs by 0.2 % in the median and 1.2 % at most, where 15 % are allowed."""

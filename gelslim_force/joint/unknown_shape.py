@@ -16,6 +16,7 @@ from gelslim_force.contact.shading_change import MOST_FAINT, TOO_FAINT, LostColo
 from gelslim_force.joint.estimator import JointEstimator
 from gelslim_force.joint.fit_state import FrameData, JointForces
 from gelslim_force.joint.marker_misfit import with_hidden, with_misfit
+from gelslim_force.joint.rounds import Steps, finished
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.marker_noise import noise_px
 from ifem_export.errors import IfemError
@@ -91,6 +92,12 @@ class UnknownShape:
         Returns:
             The forces, None without contact, or why there are no forces.
         """
+        return finished(self.looking(image, markers_px))
+
+    def looking(
+        self, image: NDArray[np.uint8], markers_px: Array
+    ) -> Steps[JointForces | str | None]:
+        """`look`, which stops before each solution; no other frame is looked at before it ends."""
         noise = noise_px(self.reference, markers_px - self.reference.positions_px)
         last, self._last = self._last, None
         try:
@@ -98,10 +105,10 @@ class UnknownShape:
             self._faint = 1.0 if frame.seen is None else frame.seen.shading.faint
             if self._faint > MOST_FAINT:
                 return TOO_FAINT
-            found = self._estimate(frame, last)
+            found = yield from self._estimate(frame, last)
             if found is not None and last is not None and not self._explains(found):
                 # The frame before was spoiled, or showed another contact.
-                found = self._estimate(frame)
+                found = yield from self._estimate(frame)
         except (IfemError, LostColourError) as error:
             return str(error)
         if found is None or self._explains(found):
@@ -113,14 +120,16 @@ class UnknownShape:
             return found
         return None if -found.force_n[:, 2].sum() < self.unseen_n else found
 
-    def _estimate(self, frame: FrameData, last: JointForces | None = None) -> JointForces | None:
+    def _estimate(
+        self, frame: FrameData, last: JointForces | None = None
+    ) -> Steps[JointForces | None]:
         """Forces of a frame, by a linear gel where no motion at large strain explains it."""
         try:
-            return self.estimator.estimate(frame, last)
+            return (yield from self.estimator.steps(frame, last))
         except (FiniteStrainError, ConvergenceError):
             if self.without_strain is None:
                 raise
-        found = self.without_strain.estimate(frame)
+        found = yield from self.without_strain.steps(frame)
         return found and replace(found, by_linear_law=True)
 
     def _explains(self, found: JointForces) -> bool:

@@ -93,17 +93,13 @@ class NeoHookeanPad:
         from ifem_export.finite_strain import kernel
 
         u = self._checked(displacement_mm)
-        hexes = self.mesh.hexes
-        starts, entries = self._incidence
-        corners = np.empty((len(hexes), 8, 3))
-        total = np.empty((self.n_nodes, 3))
+        hexes, total = self.mesh.hexes, np.empty((self.n_nodes, 3))
         size = np.array(self.mesh.cell_size_mm)
         g, bulk = self.material.shear_modulus_mpa, self.material.bulk_modulus_mpa
-        cell = int(kernel.element_forces(hexes, u, size, g, bulk, LEAST_J, corners))
+        cell = int(kernel.nodal_forces(hexes, u, size, g, bulk, LEAST_J, total))
         if cell >= 0:
             states = element.gauss_states(u[hexes[cell : cell + 1]], self.mesh.cell_size_mm)
             raise self._inversion(cell, states.dilatation[0])
-        kernel.gather(starts, entries, corners.reshape(-1, 3), total)
         return total
 
     def predicted_pressure_mpa(self, displacement_mm: ArrayLike, step_mm: Array) -> Array:
@@ -189,14 +185,6 @@ class NeoHookeanPad:
             (i, j, k),
             least,
         )
-
-    @cached_property
-    def _incidence(self) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-        """Corner entries (8 cell + corner) of each node in increasing order, as CSR."""
-        flat = self.mesh.hexes.ravel()
-        entries = np.argsort(flat, kind="stable").astype(np.int32)
-        counts = np.bincount(flat, minlength=self.n_nodes)
-        return np.concatenate([[0], np.cumsum(counts)]), entries
 
     @cached_property
     def _blocks(self) -> tuple[NDArray[np.int32], NDArray[np.int32], sparse.csr_array]:

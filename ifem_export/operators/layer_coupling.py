@@ -107,9 +107,14 @@ class LayerCoupling:
         below = inner_mm.reshape(-1, self.system.columns, 3)[-1]
         return self._down.force(np.vstack([_with_zero(below), _with_zero(surface_mm)]))
 
+    def from_inner(self, inner_mm: Array) -> Array:
+        """K_si u_i: forces (c, 3) on the surface for motions (3n,) of the n inner nodes."""
+        below = inner_mm.reshape(-1, self.system.columns, 3)[-1]
+        return self._below.force(_with_zero(below))
+
     @property
     def n_bytes(self) -> int:
-        """Bytes that both products read."""
+        """Bytes that `on_inner` and `on_surface` read."""
         return self._up.n_bytes + self._down.n_bytes
 
     @cached_property
@@ -118,9 +123,14 @@ class LayerCoupling:
         return stencil(self.system, 1, ABOVE)
 
     @cached_property
+    def _below(self) -> Stencil:
+        """From the layer below the surface to the surface."""
+        return stencil(self.system, 0, BELOW)
+
+    @cached_property
     def _down(self) -> Stencil:
         """From the layer below the surface, and the surface itself, to the surface."""
-        below, beside = stencil(self.system, 0, BELOW), stencil(self.system, 0, BESIDE)
+        below, beside = self._below, stencil(self.system, 0, BESIDE)
         after = beside.neighbours + self.system.columns + 1
         return Stencil(
             below.types,

@@ -175,6 +175,19 @@ def test_numpy_and_compiled_agree(nu, shape):
     assert gap < 2e-14 * scale_of(material)
 
 
+@pytest.mark.parametrize(("least", "most"), [(0.251, 3.99), (0.02, 30.0)])
+def test_cells_of_any_volume_ratio(least, most):
+    """Each cell of a row has another ratio J, up to the ends of the approximation and beyond."""
+    ratio = np.geomspace(least, most, 37)
+    mesh = PadMesh.from_occupancy(np.ones((37, 1, 1), dtype=bool), SIZE, (0.0, 0.0, 0.0))
+    body = NeoHookeanPad(mesh, Material(0.147, 0.3223, 1.0))
+    place = SIZE[0] * np.concatenate([[0.0], np.cumsum(ratio)])
+    u = np.zeros((mesh.n_nodes, 3))
+    u[:, 0] = place[np.rint(mesh.nodes_mm[:, 0] / SIZE[0]).astype(int)] - mesh.nodes_mm[:, 0]
+    expected = neo_hookean_force(body, u)
+    assert np.abs(body.force(u) - expected).max() < 1e-13 * np.abs(expected).max()
+
+
 def test_scaling_mirror_and_input_forms():
     mesh = crop(7)
     material, u = Material(0.147, 0.49, 1.0), wobble(mesh)

@@ -235,6 +235,8 @@ def test_forces_between_surface_and_inner_nodes_need_no_matrix(layers: int) -> N
         np.testing.assert_allclose(quick.on_inner(u), assembled.on_inner(u), atol=1e-13)
         found, expected = (c.on_surface(u, inner) for c in (quick, assembled))
         np.testing.assert_allclose(found, expected, atol=1e-13)
+        of_inner = (system.inner_to_surface @ inner).reshape(-1, 3)
+        np.testing.assert_allclose(quick.from_inner(inner), of_inner, atol=1e-13)
 
 
 def matrix_bytes(*matrices) -> int:

@@ -91,28 +91,25 @@ def interpolated_rows(
 
 
 @njit(**COMPILED)
-def stencil_columns(
-    stencil: Any, at: Any, places: Any, rows: Any, columns: Any, found: Any
-) -> None:
+def stencil_columns(stencil: Any, at: Any, places: Any, columns: Any, found: Any) -> None:
     """Add the heights about forces at places (q, 2) of a lattice to their columns.
 
     Args:
         stencil: (2r + 1, 2r + 1) height by the distance.
         at: (q, 2).
-        places: (nx, ny) number of each place; -1 where there is none.
-        rows: (f,) row of `found` of each place; -1 where it has none.
+        places: (m, 2) of the heights on the lattice.
         columns: (q, s) of `found`, whose mean each force is.
         found: (m, k), to which the heights are added.
     """
-    reach, share = stencil.shape[0] // 2, 1 / columns.shape[1]
-    for n in range(len(at)):
-        row, column = at[n, 0] - reach, at[n, 1] - reach
-        for a in range(max(-row, 0), min(stencil.shape[0], places.shape[0] - row)):
-            for b in range(max(-column, 0), min(stencil.shape[1], places.shape[1] - column)):
-                place = places[row + a, column + b]
-                if place >= 0 and rows[place] >= 0:
-                    for source in columns[n]:
-                        found[rows[place], source] += share * stencil[a, b]
+    size, share = stencil.shape[0], 1 / columns.shape[1]
+    for i in range(len(places)):
+        x, y, out = places[i, 0] + size // 2, places[i, 1] + size // 2, found[i]
+        for n in range(len(at)):
+            a, b = x - at[n, 0], y - at[n, 1]
+            if 0 <= a < size and 0 <= b < size:
+                height = share * stencil[a, b]
+                for k in range(columns.shape[1]):
+                    out[columns[n, k]] += height
 
 
 @njit(**COMPILED)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_TOGETHER = 8
 
 
 @njit(**COMPILED)
@@ -53,16 +55,50 @@ def marker_data(
 
 
 @njit(**COMPILED)
-def half_width(matrix: Any) -> Any:
-    """Largest distance from the diagonal of an entry of a symmetric matrix (m, m) that is not 0."""
+def sparse_rows(starts: Any, columns: Any, values: Any, rows: Any, right: Any, found: Any) -> None:
+    """Some rows (m,) of the product of a sparse matrix by rows and `right` (c, 3).
+
+    Args:
+        starts: (n + 1,) first entry of each row of the sparse matrix.
+        columns: Of its entries.
+        values: Of its entries.
+        rows: (m,) of it.
+        right: (c, 3).
+        found: (n, 3), of which these rows are written.
+    """
+    for row in rows:
+        x = y = z = 0.0
+        for k in range(starts[row], starts[row + 1]):
+            value, at = values[k], columns[k]
+            x += value * right[at, 0]
+            y += value * right[at, 1]
+            z += value * right[at, 2]
+        found[row, 0], found[row, 1], found[row, 2] = x, y, z
+
+
+@njit(**COMPILED, fastmath={"contract", "nsz"})
+def sparse_product(matrix: Any, right: Any, found: Any) -> None:
+    """Product of a matrix (m, m), most of which is zero, and `right` (m, q), to `found` (m, q)."""
     size = len(matrix)
-    most = 0
+    at, value = np.empty(size + _TOGETHER, np.intp), np.empty(size + _TOGETHER, right.dtype)
     for i in range(size):
-        for j in range(i - most):
+        count = 0
+        for j in range(size):
             if matrix[i, j] != 0:
-                most = i - j
-                break
-    return most
+                at[count], value[count] = j, matrix[i, j]
+                count += 1
+        at[count : count + _TOGETHER], value[count : count + _TOGETHER] = i, 0
+        out = found[i]
+        out[:] = 0
+        # Eight rows at a time, so that the sums are seldom read and written.
+        for n in range(0, count, _TOGETHER):
+            a, b, c, d = right[at[n]], right[at[n + 1]], right[at[n + 2]], right[at[n + 3]]
+            e, f, g, h = right[at[n + 4]], right[at[n + 5]], right[at[n + 6]], right[at[n + 7]]
+            s, t, u, v = value[n], value[n + 1], value[n + 2], value[n + 3]
+            w, x, y, z = value[n + 4], value[n + 5], value[n + 6], value[n + 7]
+            for k in range(len(out)):
+                first = s * a[k] + t * b[k] + u * c[k] + v * d[k]
+                out[k] += first + (w * e[k] + x * f[k] + y * g[k] + z * h[k])
 
 
 @njit(**COMPILED)

@@ -279,24 +279,21 @@ def gather_heights(values: Any, near: Any, nodes: Any, found: Any) -> None:
 
 
 @njit(**COMPILED)
-def gather_markers(values: Any, markers: Any, nodes: Any, by_height: Any, found: Any) -> None:
-    """Rows (2n, 3p) of what a picture shows of the motion of markers (n,) under forces on (p,).
+def gather_markers(values: Any, markers: Any, nodes: Any, found: Any) -> None:
+    """Rows (2n, 3p) of lateral motions of markers (n,) under forces on nodes (p,).
 
     Args:
-        values: (markers, 3, c, 3) motion of the markers.
+        values: (markers, 2, c, 3) motion of the markers as a picture shows it.
         markers: (n,) those used.
         nodes: (p,).
-        by_height: (n, 2) lateral motion that the picture shows per mm less of height.
         found: Receives the rows.
     """
     for k in range(len(markers)):
-        block = values[markers[k]]
-        lean_x, lean_y = by_height[k, 0], by_height[k, 1]
-        for n in range(len(nodes)):
-            along, across, height = block[0, nodes[n]], block[1, nodes[n]], block[2, nodes[n]]
-            for axis in range(3):
-                found[2 * k, 3 * n + axis] = along[axis] - lean_x * height[axis]
-                found[2 * k + 1, 3 * n + axis] = across[axis] - lean_y * height[axis]
+        for along in range(2):
+            row, out = values[markers[k], along], found[2 * k + along]
+            for n in range(len(nodes)):
+                one = row[nodes[n]]
+                out[3 * n], out[3 * n + 1], out[3 * n + 2] = one[0], one[1], one[2]
 
 
 @njit(**COMPILED)

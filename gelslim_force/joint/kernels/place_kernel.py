@@ -107,28 +107,16 @@ def sums_of_taps(nodes: Any, along: Any, across: Any, values: Any, found: Any) -
 
 
 @njit(**COMPILED)
-def turn_taps(
-    nodes: Any,
-    along: Any,
-    across: Any,
-    lateral: Any,
-    least: Any,
-    turned_along: Any,
-    turned_across: Any,
-) -> None:
-    """Weights (n, 16) of slopes by deformed places, from those by places at rest.
-
-    They are F⁻ᵀ times the slopes by the places at rest, with the deformation gradient F of the
-    plane.
+def plane_turns(nodes: Any, along: Any, across: Any, lateral: Any, least: Any, found: Any) -> None:
+    """F⁻ᵀ (n, 2, 2) with the deformation gradient F of the plane.
 
     Args:
         nodes: (n, 16).
-        along: (n, 16) weights of the slope along x.
+        along: (n, 16) weights of the slope along x, by places at rest.
         across: (n, 16) those along y.
         lateral: (c, 2) motion of the nodes in the plane.
         least: Determinant of F that is taken in place of a smaller one.
-        turned_along: Receives (n, 16).
-        turned_across: Receives (n, 16).
+        found: Receives (n, 2, 2).
     """
     for k in range(len(nodes)):
         xx, xy, yx, yy = 1.0, 0.0, 0.0, 1.0
@@ -139,20 +127,26 @@ def turn_taps(
             yx += along[k, tap] * y
             yy += across[k, tap] * y
         over = 1 / max(xx * yy - xy * yx, least)
-        for tap in range(nodes.shape[1]):
-            a, b = along[k, tap], across[k, tap]
-            turned_along[k, tap] = (yy * a - yx * b) * over
-            turned_across[k, tap] = (xx * b - xy * a) * over
+        found[k, 0, 0], found[k, 0, 1] = yy * over, -yx * over
+        found[k, 1, 0], found[k, 1, 1] = -xy * over, xx * over
 
 
 @njit(**COMPILED)
-def turn_slopes(along: Any, across: Any, turn: Any) -> None:
-    """Multiply slopes, the weights (n, 16) along x and y, by matrices (n, 2, 2) in place."""
+def turn_slopes(along: Any, across: Any, turn: Any, turned_along: Any, turned_across: Any) -> None:
+    """Multiply slopes, the weights (n, 16) along x and y, by matrices (n, 2, 2).
+
+    Args:
+        along: (n, 16).
+        across: (n, 16).
+        turn: (n, 2, 2).
+        turned_along: Receives (n, 16).
+        turned_across: Receives (n, 16).
+    """
     for k in range(len(turn)):
         for tap in range(along.shape[1]):
             a, b = along[k, tap], across[k, tap]
-            along[k, tap] = turn[k, 0, 0] * a + turn[k, 0, 1] * b
-            across[k, tap] = turn[k, 1, 0] * a + turn[k, 1, 1] * b
+            turned_along[k, tap] = turn[k, 0, 0] * a + turn[k, 0, 1] * b
+            turned_across[k, tap] = turn[k, 1, 0] * a + turn[k, 1, 1] * b
 
 
 @njit(**COMPILED)

@@ -84,3 +84,22 @@ def city_block(picture: Any, outside: Any, distance: Any) -> None:
             below = distance[i + 1, j] if i < rows - 1 else edge
             after = distance[i, j + 1] if j < columns - 1 else edge
             distance[i, j] = min(distance[i, j], below + 1, after + 1)
+
+
+@njit(**COMPILED)
+def widen_nodes(nodes: Any, place: Any, steps: Any, distance: Any, found: Any) -> None:
+    """Mark in `found` (c,) the nodes up to `steps` along a lattice away from one of `nodes` (c,).
+
+    Args:
+        nodes: (c,) marks.
+        place: (c, 2) of the nodes on the lattice.
+        steps: Along rows and columns, also over places without a node.
+        distance: (rows, columns) is overwritten.
+        found: Receives the marks.
+    """
+    picture = np.zeros(distance.shape, dtype=np.bool_)
+    for n in range(len(nodes)):
+        picture[place[n, 0], place[n, 1]] = nodes[n]
+    city_block(picture, False, distance)
+    for n in range(len(nodes)):
+        found[n] = distance[place[n, 0], place[n, 1]] <= steps

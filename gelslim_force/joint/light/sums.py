@@ -171,15 +171,12 @@ def placed_bins(
         return np.take(layers.reshape(*layers.shape[:-2], -1), bins, axis=-1)
 
     taps, slope = lattice.slopes_at(places), None
-    if finer is None:
-        taps = taps.on_deformed(displacement_mm[:, :2])
-    elif close is None:
-        turn, flat = taps.turn(displacement_mm[:, :2]), finer[0].slopes_at(places)
-        slope = np.einsum("nij,nj->ni", turn, flat.slopes(finer[1]))
-        taps = taps.on_deformed(displacement_mm[:, :2])
-    else:
-        flat = finer[0].slopes_about(places, lattice.picture(close))
-        taps = flat.turned(taps.turn(displacement_mm[:, :2]))
+    turn = taps.turn(displacement_mm[:, :2])
+    if finer is not None and close is not None:
+        taps = finer[0].slopes_about(places, lattice.picture(close))
+    elif finer is not None:
+        slope = np.einsum("nij,nj->ni", turn, finer[0].slopes_at(places).slopes(finer[1]))
+    taps = taps.turned(turn)
     return PlacedBins(
         taps,
         of(seen.log_change),

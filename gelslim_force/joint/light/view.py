@@ -122,7 +122,8 @@ class LightView:
         grey = np.stack([self._light.levels()[c] for c in self.channels]).astype(float)
         falling = light.at(self.rest_mm[..., 0], self.rest_mm[..., 1])
         share = light.colour[:, None, None, self.channels] * np.moveaxis(falling, -1, 0)[..., None]
-        share = np.moveaxis(share, -1, 1)
+        # In the order of the bins: each frame reads a part of them several times.
+        share = np.ascontiguousarray(np.moveaxis(share, -1, 1))
         return grey / (grey + FLOOR), share / np.maximum(share.sum(axis=0), 1e-12)
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenLight:
@@ -193,15 +194,14 @@ def _by_channel(
     then each further channel less that mean.
     """
     change, noise = shading.change, shading.noise
-    logs, sigma = [], []
-    for channel in channels:
+    logs, sigma = np.empty((2, len(channels), *change.shape[1:]))
+    for k, channel in enumerate(channels):
         number = int(np.flatnonzero(used == channel)[0])
         if len(used) == 1:
-            logs.append(change[0])
-            sigma.append(noise[0])
+            logs[k], sigma[k] = change[0], noise[0]
             continue
         part = (0.5, -0.5)[number] * change[0] if number < 2 else change[number]
         own = noise[0] / 2 if number < 2 else noise[number]
-        logs.append(change[1] + part)
-        sigma.append(np.sqrt(noise[1] * noise[1] + own * own))
-    return np.asarray(logs, dtype=float), np.asarray(sigma, dtype=float)
+        np.add(change[1], part, out=logs[k])
+        np.sqrt(noise[1] * noise[1] + own * own, out=sigma[k])
+    return logs, sigma

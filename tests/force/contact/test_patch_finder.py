@@ -331,25 +331,27 @@ def test_circle_and_strip_fits_have_honest_errors():
 
 
 def test_light_ratios_are_those_of_numpy():
-    from gelslim_force.contact.shading_kernel import bin_sums, block_discs, light_ratios
+    from gelslim_force.contact.shading_kernel import FREE, block_discs, glaring_bins, light_ratios
 
     rng = np.random.default_rng(0)
     for channels in (1, 3):
         pair = rng.integers(0, 256, (2, 50, 70, channels)).astype(np.uint8)
         pair[:, 30:40, 20:40] = 255
         pair = read_only(pair)
-        blocked, touched = np.zeros((50, 70), np.uint8), np.zeros((12, 17), np.uint8)
-        discs = np.array([[20.3, 10.0], [-2.0, 60.0], [np.nan, 1.0]])
-        block_discs(blocked, discs, np.full(3, 5.5), 4, touched)
+        mask = np.full((50, 70), FREE, np.uint8)
+        discs = np.array([[20.3, 10.0], [-2.0, 60.0], [np.nan, 1.0], [68.6, 48.7]])
+        block_discs(mask, discs, np.full(4, 5.5))
         y, x = np.mgrid[:50, :70]
-        assert (blocked == (np.hypot(x - 20.3, y - 10) <= 5.5)).all()
-        assert touched[blocked[:48, :68].reshape(12, 4, 17, 4).any(axis=(1, 3))].all()
-        sums, glaring = np.ones((2, 12, 17, channels), np.int64), np.ones((2, 12, 17), np.uint8)
-        for image, total, may in zip(pair, sums, glaring, strict=True):
-            bin_sums(image, 4, total, may)
+        blocked = (np.hypot(x - 20.3, y - 10) <= 5.5) | (np.hypot(x - 68.6, y - 48.7) <= 5.5)
+        assert (mask == np.where(blocked, 0, FREE)).all()
+        glaring = np.ones((2, 12, 17), np.uint8)
+        for image, may in zip(pair, glaring, strict=True):
+            glaring_bins(image, 4, may)
+        assert glaring.any()
+        assert not glaring.all() or channels == 1
         ratios, counts = np.ones((channels, 12, 17), np.float32), np.ones((12, 17), np.int64)
-        light_ratios(*pair, blocked, touched, glaring[0] | glaring[1], 4, sums, 5.0, ratios, counts)
-        free = (blocked == 0) & (pair.min(axis=3) < 253).all(axis=0)
+        light_ratios(*pair, mask, glaring[0] | glaring[1], 4, 5.0, ratios, counts)
+        free = ~blocked & (pair.min(axis=3) < 253).all(axis=0)
         cut = (pair * free[..., None])[:, :48, :68].reshape(2, 12, 4, 17, 4, channels)
         left = free[:48, :68].reshape(12, 4, 17, 4).sum(axis=(1, 3))
         assert (counts == left).all()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +13,12 @@ from pressed_samples import Pressed, calibration, lit_bundle, reference
 from pressed_shapes import Shape, ball, edge, pressed_shape, punch, rod, two_balls
 from shaded_frames import shaded
 
+from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.checked_indenter import CheckedIndenter
+from gelslim_force.joint.estimator import JointEstimator
+from gelslim_force.joint.fit_state import FitState, JointForces
+from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import open_sensor
 from gelslim_force.settings import PipelineSettings
@@ -120,6 +125,69 @@ def test_the_verdict_holds_between_comparisons_and_goes_with_the_contact() -> No
     still = shaded(camera=calibration().camera, seed=9, noise=2.5).image
     assert chain.process(still).normal_known
     assert not chain.process(truth.image).normal_known
+
+
+def solutions_of(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Counts, one for each frame that the test begins, of the solutions of the witness."""
+    counts, solution = [0], JointEstimator.solution
+
+    def counted(*given: Any) -> FitState:
+        counts[-1] += 1
+        return solution(*given)
+
+    monkeypatch.setattr(JointEstimator, "solution", counted)
+    return counts
+
+
+@pytest.mark.slow
+def test_the_comparison_every_ten_frames_is_spread_over_several(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It ends alike as one that is made at once, of the frame with which it began."""
+    truth = pressed_shape(ball(6.0), 0.35, (1.0, -1.0), 0.0, 3)
+    chain, counts = checked("sphere:6"), solutions_of(monkeypatch)
+    source = chain.normal
+    assert isinstance(source, CheckedIndenter)
+    judged: list[tuple[float, Any]] = []
+    compared = source._compared
+
+    def noted(reading: NormalReading, found: Any) -> Any:
+        judged.append((reading.push_n, found))
+        return compared(reading, found)
+
+    monkeypatch.setattr(source, "_compared", noted)
+    chain.reset()
+    for _ in range(25):
+        assert chain.process(truth.image).normal_known
+        counts.append(0)
+    assert counts[0] >= 2
+    assert max(counts[1:]) <= 2
+    busy = np.flatnonzero(counts)
+    assert busy[0] == 0
+    assert set(busy[1:]) <= {10, 11, 12, 20, 21, 22}
+    assert len(busy) > 2
+    forces = [found.force_n[:, 2].sum() for _, found in judged]
+    np.testing.assert_allclose(forces, forces[0], rtol=0.02)
+
+
+@pytest.mark.slow
+def test_three_solutions_give_the_force_of_five() -> None:
+    rng = np.random.default_rng(5)
+    for number, shape in enumerate((ball(5.0), rod(2.5), punch(2.2), two_balls(2.4, 4.0))):
+        truth, chain = random_press(rng, shape, number), checked("sphere:6")
+        source = chain.normal
+        assert isinstance(source, CheckedIndenter)
+        chain.reset()
+        _, tracked = chain._followed(truth.image)
+        few = source.witness
+        whole = replace(few.estimator, settings=replace(few.estimator.settings, rounds=(2, 1)))
+        forces = []
+        for estimator in (few.estimator, whole):
+            witness = UnknownShape(estimator, few.reference, few.unseen_mm)
+            found = witness.look(truth.image, tracked.tracks.positions_px)
+            assert isinstance(found, JointForces)
+            forces.append(float(found.force_n[:, 2].sum()))
+        assert forces[0] == pytest.approx(forces[1], rel=0.02)
 
 
 @pytest.mark.slow

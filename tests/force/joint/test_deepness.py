@@ -11,7 +11,13 @@ from pressed_samples import light_map
 from sensor_samples import sensor_bundle
 
 from gelslim_force.forces.finite_strain import law_of
-from gelslim_force.joint.deepness import FULLY, deepness, settings_at, traction_sigma_mpa
+from gelslim_force.joint.deepness import (
+    FULLY,
+    deepness,
+    least_pressure_at,
+    light_share_at,
+    traction_sigma_mpa,
+)
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
 from gelslim_force.joint.settings import USUAL_CELL, JointSettings
@@ -28,10 +34,11 @@ def test_deepness_grows_from_the_depth_on() -> None:
 
 def test_settings_of_shallow_contacts_are_those_given() -> None:
     chosen = JointSettings()
-    assert settings_at(chosen, 0.0) is chosen
-    half = settings_at(chosen, 0.5)
+    assert light_share_at(chosen, 0.0) == chosen.light_share
+    assert least_pressure_at(chosen, 0.0) == chosen.least_pressure
     mean = (chosen.light_share + chosen.deep_light_share) / 2
-    assert half.light_share == pytest.approx(mean)
+    assert light_share_at(chosen, 0.5) == pytest.approx(mean)
+    assert least_pressure_at(chosen, 1.0) == pytest.approx(chosen.deep_least_pressure)
     traction = np.array([[0.0, 0.0, -0.3], [0.0, 0.0, -0.1], [0.0, 0.0, 0.2]])
     usual = 0.1 * chosen.roughness, 0.1 * chosen.tangential_stress
     assert traction_sigma_mpa(chosen, 0.0, 0.1, traction) == pytest.approx(usual)

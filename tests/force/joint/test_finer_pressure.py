@@ -118,7 +118,7 @@ def test_heights_by_force_are_those_of_each_force(seed: int) -> None:
     rng, found = np.random.default_rng(seed), pressure()
     points = np.asarray(sensor_bundle().mesh.surface_mm)
     compliance = SurfaceCompliance(sensor_bundle())
-    responses = Responses(compliance, marker_to_node(points, points[:3, :2]))
+    responses = Responses(compliance, marker_to_node(points, points[:3, :2]), np.zeros((3, 2)))
     nodes = np.flatnonzero(np.hypot(*(points[:, :2] - rng.uniform(-2, 2, 2)).T) < 1.2)
     inner = np.zeros(len(points), dtype=bool)
     inner[nodes] = True

@@ -8,9 +8,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, sparse
 
-from gelslim_force.joint.kernels.fit_kernel import marker_data
+from gelslim_force.joint.kernels.fit_kernel import marker_data, sparse_product, sparse_rows
 from gelslim_force.joint.kernels.light_kernel import gather_heights, gather_markers, light_data
 from gelslim_force.joint.kernels.region_kernel import bins_above_noise
 from gelslim_force.joint.light.sums import LightSums, placed_bins
@@ -164,13 +164,41 @@ def test_gathered_rows_are_those_of_fancy_indexing() -> None:
     found = np.empty((11, 18), dtype=np.float32)
     gather_heights(heights, near, nodes, found)
     np.testing.assert_array_equal(found, heights[near][:, nodes].reshape(11, 18))
-    motion = rng.normal(size=(30, 3, 30, 3)).astype(np.float32)
-    lean = rng.normal(size=(9, 2)).astype(np.float32)
+    motion = rng.normal(size=(30, 2, 30, 3)).astype(np.float32)
     rows = np.empty((18, 18), dtype=np.float32)
-    gather_markers(motion, markers, nodes, lean, rows)
-    chosen = motion[markers][:, :, nodes]
-    expected = chosen[:, :2] - lean[:, :, None, None] * chosen[:, 2:]
-    np.testing.assert_allclose(rows, expected.reshape(18, 18), rtol=1e-6, atol=1e-6)
+    gather_markers(motion, markers, nodes, rows)
+    np.testing.assert_array_equal(rows, motion[markers][:, :, nodes].reshape(18, 18))
+
+
+def test_some_rows_of_a_sparse_product_are_those_of_scipy() -> None:
+    rng = np.random.default_rng(9)
+    matrix = sparse.random_array((30, 20), density=0.2, rng=rng, format="csr")
+    right, rows = rng.normal(size=(20, 3)), np.sort(rng.permutation(30)[:12])
+    found = np.full((30, 3), 7.0)
+    sparse_rows(matrix.indptr, matrix.indices, matrix.data, rows, right, found)
+    np.testing.assert_allclose(found[rows], (matrix @ right)[rows], rtol=1e-14, atol=1e-15)
+    assert (np.delete(found, rows, axis=0) == 7.0).all()
+
+
+@pytest.mark.parametrize("rings", [0, 1, 3])
+def test_nodes_are_widened_over_places_without_a_node(rings: int) -> None:
+    found, rng = lattice(), np.random.default_rng(rings)
+    marked = rng.random(len(found.place)) < 0.03
+    wide = found.picture(marked)
+    if rings:
+        wide = ndimage.binary_dilation(wide, iterations=rings)
+    expected = wide[found.place[:, 0], found.place[:, 1]]
+    np.testing.assert_array_equal(found.widened(marked, rings), expected)
+
+
+@pytest.mark.parametrize(("size", "columns"), [(1, 3), (40, 17), (97, 64)])
+def test_a_product_without_zeros_is_that_of_numpy(size: int, columns: int) -> None:
+    rng = np.random.default_rng(size)
+    matrix = rng.normal(size=(size, size)) * (rng.random((size, size)) < 0.2)
+    right = rng.normal(size=(size, columns)).astype(np.float32)
+    found = np.empty_like(right)
+    sparse_product(matrix.astype(np.float32), right, found)
+    np.testing.assert_allclose(found, matrix @ right, atol=3e-6 * np.abs(matrix @ right).max())
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.4])

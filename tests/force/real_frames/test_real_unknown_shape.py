@@ -94,7 +94,7 @@ def real_sensor() -> RealSensor:
             surface_share_mm2(mesh),
             neighbour_matrix(points, cell),
             lattice,
-            Responses(SurfaceCompliance(bundle), to_markers),
+            Responses(SurfaceCompliance(bundle), to_markers, view.by_height()),
             view,
             to_markers,
             lattice.interpolation(view.rest_mm) - to_markers,
