@@ -129,7 +129,7 @@ def test_video_and_recording(sensor: Path, tmp_path: Path, capsys) -> None:
     assert (tmp_path / "v.mp4").stat().st_size > 1000
     with open(tmp_path / "r.mcap", "rb") as stream:
         (about,) = pytest.importorskip("mcap.reader").make_reader(stream).iter_metadata()
-    assert about.metadata["gel_law"] == about.metadata["gel_asked"] == "linear"
+    assert about.metadata["gel_law"] == about.metadata["gel_asked"] == "auto"
     recorded = read_run(tmp_path / "run")
     assert len(recorded.wrenches["index"]) == 5
 
