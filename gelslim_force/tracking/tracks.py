@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.immutable import Immutable
+from gelslim_core.immutable import Immutable, frozen
 
 
 class MarkerStatus(IntEnum):
@@ -41,15 +42,15 @@ class Tracks(Immutable):
         """Return the number of markers."""
         return len(self.status)
 
-    @property
+    @cached_property
     def tracked(self) -> NDArray[np.bool_]:
         """(n,) whether a marker was seen and verified."""
-        return self.status == int(MarkerStatus.TRACKED)
+        return frozen(self.status == int(MarkerStatus.TRACKED))
 
-    @property
+    @cached_property
     def known(self) -> NDArray[np.bool_]:
         """(n,) whether a marker has a position, seen or predicted."""
-        return np.isfinite(self.positions_px[:, 0]) & np.isfinite(self.positions_px[:, 1])
+        return frozen(np.isfinite(self.positions_px[:, 0]) & np.isfinite(self.positions_px[:, 1]))
 
     @property
     def coverage(self) -> float:
