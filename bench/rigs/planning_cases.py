@@ -100,17 +100,24 @@ class Case:
         viewer = partial(viewer_of, self.trial.loaded, self.trial.sensor)
         return planned(self.trial.loaded, self.trial.asked, lambda: pad, viewer)
 
-    def run(self, plan: Plan, pad: SurfaceCompliance | None = None) -> Run:
+    def run(
+        self, plan: Plan, pad: SurfaceCompliance | None = None, known: Run | None = None
+    ) -> Run:
         """Solve all poses, and draw some pictures where they are observed. Raises ContactError.
 
         `pad` is the compliance that a probe has used, as in a simulation; by default it is read.
+        The gel of a `known` run by a plan with the same mechanics is not solved again: its time
+        would differ by the load of the machine only.
         """
         poses, pad = self.trial.poses, pad or self.trial.compliance
 
         def solved() -> tuple[GelState, ...]:
             return tuple(mechanics_of(self.trial.loaded, plan, pad).states(poses))
 
-        states, gel_ms = spent(solved)
+        if known is not None and mechanics_key(known.outcome.plan) == mechanics_key(plan):
+            states, gel_ms = known.outcome.states, known.gel_ms
+        else:
+            states, gel_ms = spent(solved)
         self.kept[mechanics_key(plan)] = states
         outcome = self.trial.carried_out(plan, states)
         seen = {"markers", "image"} & {*self.trial.asked.observe}
@@ -203,7 +210,7 @@ def measured(
     asked = case.trial.asked
     pad = case.trial.compliance
     plan, planning_ms = spent(lambda: case.chosen(pad))
-    run = case.run(plan, pad)
+    run = case.run(plan, pad, every)
     used = case.used(run.outcome, every.outcome)
     doubtful = 0.0
     if "image" in asked.observe:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import islice
 from math import inf, isinf
 
@@ -29,6 +29,7 @@ from gelslim_twin.contact.solver import Candidates, ContactSolver
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
+from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.solver import ConvergenceError, Solver, pad_solver
 
 __all__ = [
@@ -81,9 +82,12 @@ class Correction:
 
     @cached_property
     def _law(self) -> FiniteStrainForce:
-        return FiniteStrainForce(
+        law = FiniteStrainForce(
             self.bundle, tolerance=self.tolerance, most_steps=LAW_STEPS, inner_rtol=self._solved
         )
+        # A probe and the run after it share the stiffness; solvers, which learn, are their own.
+        law.__dict__["system"] = _linear_system(self.bundle)
+        return law
 
     @cached_property
     def _solver(self) -> Solver:
@@ -110,6 +114,11 @@ class Correction:
         except (FiniteStrainError, ConvergenceError) as error:
             raise ContactError(str(error)) from error
         return np.asarray(offset_mm - moved[-len(rest) :])
+
+
+@lru_cache(maxsize=1)
+def _linear_system(bundle: Bundle) -> PadSystem:
+    return FiniteStrainForce(bundle).system
 
 
 @dataclass(frozen=True, eq=False)

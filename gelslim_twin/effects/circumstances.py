@@ -34,6 +34,11 @@ class EffectParameters(Block):
 
 P = TypeVar("P", bound=EffectParameters)
 
+LEAST_LIGHT = 0.35
+"""Light on the darkest dots, over the mean of a lamp, summed over the channels, where it is not
+known: the traced guides of the designs leave 0.48 to 0.64 to all but a hundredth of the pad, and
+the lens takes up to a quarter at the corners of the picture."""
+
 
 @dataclass(frozen=True)
 class SensorFigures:
@@ -65,6 +70,8 @@ class SensorFigures:
         wide_lens: Whether they are of Kannala and Brandt's model.
         skin_n_per_mm: Membrane stiffness of coat and fabric together, 0 for a bare gel.
         skin_friction: Their friction against objects, where it is known.
+        least_light: Light on the darkest dot at rest, over the mean of a lamp, summed over the
+            channels of the camera.
     """
 
     length_mm: float
@@ -92,6 +99,7 @@ class SensorFigures:
     wide_lens: bool = False
     skin_n_per_mm: float = 0.0
     skin_friction: float | None = None
+    least_light: float = LEAST_LIGHT
 
     @property
     def px_per_mm(self) -> float:
@@ -211,6 +219,10 @@ class Probed:
         together: By effect, its part of the error of leaving all these effects out at once. It
             holds for all of them and for no part of them.
         corrected: Poses that were corrected by the law at large strain.
+        dots_px: Largest displacement of the image of a dot at these poses; infinite where it was
+            not probed.
+        light_share: Largest share of the light that the slopes of the gel change, times a safety
+            factor; infinite where it was not probed.
     """
 
     normal_n: float
@@ -222,6 +234,8 @@ class Probed:
     dot_mm_s: float = math.inf
     together: Mapping[str, Bound] = field(default_factory=dict)
     corrected: tuple[CorrectedPose, ...] = ()
+    dots_px: float = math.inf
+    light_share: float = math.inf
 
 
 @dataclass(frozen=True)

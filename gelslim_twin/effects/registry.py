@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gelslim_twin.effects.adhesion import ADHESION
 from gelslim_twin.effects.contact import FRICTION, NORMAL_CONTACT, RELAXATION
-from gelslim_twin.effects.dot_contrast import DEFOCUS, DRAWING, EXPOSURE
+from gelslim_twin.effects.dot_contrast import DEFOCUS, DRAWING
 from gelslim_twin.effects.dot_positions import (
     LENS_DISTORTION,
     MARKER_PRINT,
@@ -16,10 +16,10 @@ from gelslim_twin.effects.grey_values import (
     COMPRESSION,
     DIRT,
     MOTION_BLUR,
-    SENSOR_NOISE,
     SHADING,
     SPECULAR,
 )
+from gelslim_twin.effects.image_noise import EXPOSURE, SENSOR_NOISE
 from gelslim_twin.effects.large_strain import NONLINEARITY
 from gelslim_twin.effects.skin import SKIN
 from gelslim_twin.effects.sliding_friction import SLIDING_FRICTION

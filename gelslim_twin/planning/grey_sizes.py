@@ -13,33 +13,26 @@ SHADING = "shading"
 PICTURED = (SHADING, "defocus", NOISE, "exposure", "specular", "dirt")
 """Effects of the picture that a probe draws: they change grey values, and a picture is evaluated by
 its dots. Of shading it finds the change of the light too, because that is read from a picture."""
-FLOOR_PX = 0.01
-"""What is added to the shift of dots between pictures: as much as a change of a few pixels by one
-grey value may move a dot."""
 MUCH = 0.05
 """Share of the tolerance that is much for an effect that is left out."""
 USUAL_SHARE = {
-    SHADING: 0.05,
-    "defocus": 0.07,
-    NOISE: 0.07,
-    "exposure": 0.04,
-    "specular": 0.04,
-    "dirt": 0.15,
+    SHADING: 0.2,
+    "defocus": 0.15,
+    NOISE: 0.2,
+    "exposure": 0.08,
+    "specular": 0.08,
+    "dirt": 0.2,
 }
-"""Size of an effect on the grey values over its bound, in the median of random scenes. It decides
-whether pictures are drawn and of what, but not what is left out."""
+"""Usual size of an effect on the grey values over its bound, in random scenes: more where the light
+is even, less where it is not. It decides whether pictures are drawn and of what, but not what is
+left out."""
 SAFETY = 1.6
 """Factor on the largest shift of a dot at the pose that is drawn, for the other poses and for the
-noise of other frames, beside the addition of `FLOOR_PX`. In 50 random scenes 1.22 was needed: the
-largest of many normal deviations hardly grows with their number."""
+noise of other frames, beside the addition of `dot_contrast.FLOOR_PX`. In 50 random scenes 1.22 was
+needed: the largest of many normal deviations hardly grows with their number."""
 BLEMISHED_SAFETY = {"specular": 2.0, "dirt": 4.0}
 """The same where these stay in the picture: the detector may find a dot beside them at two places,
 at some poses only. In these scenes 1.49 was needed beside spots, and 3.55 beside dirt."""
-SURELY, LEAST_PX = 25.0, 0.01
-"""Ratio of the bound of shading to the least size that it may have, and that size in any scene:
-with a tighter tolerance its light is not computed. In 9 of 10 random scenes the ratio was less."""
-FINELY, LEAST_FINE_PX = 5.0, 0.2
-"""The same where its light takes a fine lattice, which seldom pays."""
 
 
 def effects_to_draw(question: Question, plan: Plan) -> tuple[str, ...]:
@@ -86,16 +79,11 @@ def picture_safety(plan: Plan, left_out: Collection[str]) -> float:
 def usual_px(plan: Plan, effect: str) -> float:
     """What an effect on the grey values usually shifts dots by, from its bound.
 
-    Shading also changes the light, of which `least_light_px` is the least.
+    Once the change of the light is known, that is the size of shading.
     """
-    px = USUAL_SHARE[effect] * plan.choice(effect).size.image_px
-    return max(px, least_light_px(plan) / SAFETY) if effect == SHADING else px
-
-
-def least_light_px(plan: Plan) -> float:
-    """What the light of shading changes at least, as the shift of a dot's edge."""
-    ratio, least_px = (FINELY, LEAST_FINE_PX) if is_finely_shaded(plan) else (SURELY, LEAST_PX)
-    return max(least_px, plan.choice(SHADING).size.image_px / ratio)
+    choice = plan.choice(effect)
+    is_known = effect == SHADING and choice.probed
+    return choice.size.image_px * (1 / SAFETY if is_known else USUAL_SHARE[effect])
 
 
 def is_finely_shaded(plan: Plan) -> bool:

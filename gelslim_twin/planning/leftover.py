@@ -9,7 +9,6 @@ another may err by more and saves more time than that takes.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -18,6 +17,7 @@ from gelslim_twin.planning.plan import Choice, summed_error
 LEAST_SAVING = 0.01
 """Smallest saving, over the time of the plan, for which an effect takes a cheaper rung."""
 ROUNDING = 1 + 1e-12
+NEARLY = 1 + 1e-9
 
 
 def with_leftover_spent(
@@ -60,11 +60,16 @@ def _saving(
     """The choice that saves most time; empty where none keeps the tolerance."""
     whole_ms, best_ms = _whole_ms(found), 0.0
     best: tuple[Choice, ...] = ()
+    sums = {o: _sums(found.values(), o) for o in allowed}
     for name, choices in others.items():
         for other in choices:
             saved_ms = found[name].predicted_ms - other.predicted_ms
             least_ms = LEAST_SAVING * whole_ms if other.included else 0.0
-            if saved_ms > max(best_ms, least_ms) and _fits({**found, name: other}, allowed):
+            if (
+                saved_ms > max(best_ms, least_ms)
+                and _may_fit(sums, found, (other,), allowed)
+                and _fits({**found, name: other}, allowed)
+            ):
                 best, best_ms = (other,), saved_ms
     return best
 
@@ -103,12 +108,17 @@ def _fits(choices: Mapping[str, Choice], allowed: Mapping[str, float]) -> bool:
 
 
 def _sums(choices: Iterable[Choice], observable: str) -> tuple[float, float]:
-    """The sums of steady and of scattered errors."""
+    """The sum of steady errors, and that of the squares of scattered ones."""
     sums = [0.0, 0.0]
     for choice in choices:
         if choice.shares:
-            sums[choice.is_scattered] += choice.error.of(observable)
+            sums[choice.is_scattered] += _counted(choice, observable)
     return sums[0], sums[1]
+
+
+def _counted(choice: Choice, observable: str) -> float:
+    error = choice.error.of(observable)
+    return error * error if choice.is_scattered else error
 
 
 def _may_fit(
@@ -121,7 +131,7 @@ def _may_fit(
     for o, most in allowed.items():
         now = [*sums[o]]
         for choice in changed:
-            now[choice.is_scattered] += choice.error.of(o) - found[choice.effect].error.of(o)
-        if math.hypot(*now) > most * (1 + 1e-9):
+            now[choice.is_scattered] += _counted(choice, o) - _counted(found[choice.effect], o)
+        if now[0] > most * NEARLY or now[0] ** 2 + now[1] > (most * NEARLY) ** 2:
             return False
     return True

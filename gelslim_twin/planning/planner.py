@@ -47,6 +47,8 @@ class Question:
         default_factory=dict, init=False, repr=False, compare=False
     )
     """Bounds and ladders by effect, since the planner needs them in every iteration."""
+    _plans: list[Plan] = field(default_factory=list, init=False, repr=False, compare=False)
+    """The plan with all effects, once it was made."""
 
     def weighed(self, effect: Effect) -> tuple[Bound, tuple[Rung, ...]]:
         """The size of an effect (zero where its parameters do nothing) and its ladder."""
@@ -90,6 +92,14 @@ def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
     Raises:
         PlanError: The only provider of something needed is switched off.
     """
+    if effects is not EFFECTS:
+        return _made(question, effects)
+    if not question._plans:
+        question._plans.append(_made(question, effects))
+    return question._plans[0]
+
+
+def _made(question: Question, effects: Sequence[Effect]) -> Plan:
     one_by_one, jointly = _plan(question, effects), question.with_together()
     if jointly is None:
         return one_by_one
@@ -197,7 +207,7 @@ def _shares(question: Question, relevant: Sequence[Effect]) -> dict[str, float]:
     found = {}
     for o in question.observe:
         able = [e.is_scattered for e in others if _may_cost(question, e, o)]
-        gone = sum(size.of(o) for size in lost)
+        gone = math.hypot(*(size.of(o) for size in lost))
         found[o] = _equal_share(question.tolerance(o), gone, len(able) - sum(able), sum(able))
     return found
 
@@ -205,19 +215,13 @@ def _shares(question: Question, relevant: Sequence[Effect]) -> dict[str, float]:
 def _equal_share(tolerance: float, gone: float, steady: int, scattered: int) -> float:
     """The share s of each effect where as many shares use up the tolerance.
 
-    `gone` is what scattered effects use up already: (steady s)² + (gone + scattered s)² is the
+    `gone` is what scattered effects use up already: (steady s)² + scattered s² + gone² is the
     square of the tolerance (`combined`).
     """
     if gone >= tolerance:
         return 0.0
-    if not gone and not (steady and scattered):
-        return tolerance / max(1, steady + scattered)
-    if not steady:
-        return (tolerance - gone) / max(1, scattered)
-    square = steady**2 + scattered**2
-    left = (tolerance - gone) * (tolerance + gone)
-    root = math.sqrt((scattered * gone) ** 2 + square * left)
-    return (root - scattered * gone) / square
+    left = tolerance if gone == 0 else math.sqrt((tolerance - gone) * (tolerance + gone))
+    return left / math.sqrt(max(1, steady**2 + scattered))
 
 
 def _may_cost(question: Question, effect: Effect, observable: str) -> bool:

@@ -11,12 +11,12 @@ import math
 from collections.abc import Sequence
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.dot_contrast import FLOOR_PX
 from gelslim_twin.effects.effect import Rung
 from gelslim_twin.effects.grey_values import shading_ladder
 from gelslim_twin.effects.large_strain import convergence_ms, correction_ms
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.grey_sizes import (
-    FLOOR_PX,
     PICTURED,
     SHADING,
     effects_to_draw,
@@ -32,7 +32,7 @@ PROBED = ("friction", "nonlinearity", "relaxation", MOTION_BLUR)
 LEFT_OUT = ((), ("friction",), ("friction", MOTION_BLUR), ("friction", "nonlinearity"))
 """Effects that a probe leaves out until it pays, one set after the other: friction takes a second
 path, and large strain saves most of the time but takes corrections."""
-FIND_MS = 8.0
+FIND_MS = 5.5
 """Time of finding the dots of a picture of 640 x 480 pixels."""
 LEAST_PICTURES = 2
 """Pictures that show what effects do together: one with all of them and one without any."""
@@ -45,6 +45,8 @@ drawn."""
 USUAL_STRAIN = 0.5
 """Share of the declared time of large strain that counts for the pictures of a probe: small
 contacts converge faster, unless walls slide."""
+LIGHT_STEP = 4
+"""Pixels between those at which a probe computes the light."""
 FASTEST_POSES = 2
 """Further poses for the speed of the dots."""
 
@@ -60,8 +62,6 @@ def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
         c.effect
         for c in plan.included
         if c.effect in PROBED and question.circumstances.parameters[c.effect].use == "auto"
-        # A dot jumps where a wall passes it, in a step that a probe may miss.
-        if c.effect != MOTION_BLUR or not question.circumstances.has_sliding_walls
     )
     most_ms = MOST_SHARE * _run_ms(question, plan, 1.0)
     solved = next(
@@ -77,9 +77,27 @@ def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
 
 
 def _pictured(question: Question, plan: Plan, solved: tuple[str, ...]) -> tuple[str, ...]:
-    """The effects that a probe draws; none where its pictures do not pay."""
-    found = effects_to_draw(question, plan)
-    return found if most_pictures(question, plan, solved) >= LEAST_PICTURES else ()
+    """The effects that a probe draws; shading alone where its pictures do not pay."""
+    if most_pictures(question, plan, solved) >= LEAST_PICTURES:
+        return effects_to_draw(question, plan)
+    if not is_lit(question, plan):
+        return ()
+    # Where nothing else is probed, poses are solved for the light alone.
+    spent_ms = light_ms(question) + (0.0 if solved else probe_ms(question, plan, ()))
+    saved_ms = plan.choice(SHADING).predicted_ms * plan.poses
+    return (SHADING,) if spent_ms <= PAYING_SHARE * saved_ms else ()
+
+
+def is_lit(question: Question, plan: Plan) -> bool:
+    """Whether a probe may tell by how much slopes change the light that a plan computes."""
+    return SHADING in plan.order and question.circumstances.parameters[SHADING].use == "auto"
+
+
+def light_ms(question: Question) -> float:
+    """Declared time of the change of the light at a pose, or at two where the tool moves aside."""
+    ladder = shading_ladder(question.circumstances)
+    once_ms = next(r.milliseconds for r in ladder if r.parameters["pixel_step"] == LIGHT_STEP)
+    return once_ms if question.circumstances.motion.is_straight else 2 * once_ms
 
 
 def most_pictures(question: Question, plan: Plan, solved: Sequence[str]) -> int:

@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
-from gelslim_twin.effects.circumstances import Circumstances, MotionFigures, SensorFigures
+from gelslim_twin.effects.circumstances import (
+    LEAST_LIGHT,
+    Circumstances,
+    MotionFigures,
+    SensorFigures,
+)
 from gelslim_twin.effects.contact_estimate import Footprint
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import PlanError, Question, make_plan
@@ -23,6 +28,9 @@ from ifem_export.errors import IfemError
 HIGHEST_MM, LEVELS = 20.0, 100
 """Heights over its lowest point at which a tilted tool is searched for its lowest point."""
 JUST_TOUCHING_MM = 1e-9
+DULLEST = 0.85
+"""Light on the dullest place of a mottled coat over the mean: three standard deviations of the
+mottle, and a part for the interpolation of the light."""
 Vector = tuple[float, float, float]
 
 
@@ -56,6 +64,9 @@ def plan_asked(loaded: LoadedScene, asked: Question) -> Plan:
 def question(loaded: LoadedScene, sensor: SensorFigures) -> Question:
     """Observables, tolerances and circumstances of a scene, as the planner takes them."""
     scene = loaded.scene
+    if loaded.look is not None or (scene.vary is not None and scene.vary.light_gain is not None):
+        # Photographed light and lamps of any brightness are not those of the design.
+        sensor = replace(sensor, least_light=min(LEAST_LIGHT, sensor.least_light))
     footprint = tool_footprint(
         scene.indenters, loaded.folder, sensor.length_mm * sensor.width_mm, sensor.node_pitch_mm
     )
@@ -179,6 +190,7 @@ def bundle_figures(path: str | os.PathLike[str]) -> SensorFigures:
         markers=len(positions),
         marker_pitch_mm=_pitch(positions),
         marker_diameter_mm=float(np.median(diameters)),
+        least_light=_least_light(Path(path), manifest, positions),
         **_skin_figures(manifest.get("skin")),
     )
 
@@ -191,6 +203,25 @@ def _skin_figures(record: Mapping[str, Any] | None) -> dict[str, Any]:
 
     skin = Skin.from_record(record)
     return {"skin_n_per_mm": skin.stiffness_n_per_mm, "skin_friction": skin.friction}
+
+
+def _least_light(folder: Path, manifest: Mapping[str, Any], positions_mm: Any) -> float:
+    """The light on the darkest dot at rest, summed over the channels that the camera has."""
+    import numpy as np
+
+    from gelslim_optics.camera.record import is_mono
+    from gelslim_optics.light.light_map import LIGHT_FIELDS, LightMap, red_green_sides
+
+    if manifest.get("light"):
+        files = {n: manifest["arrays"][f"light_{n}"]["file"] for n in LIGHT_FIELDS}
+        light = LightMap.from_arrays({n: np.load(folder / file) for n, file in files.items()})
+    else:
+        cells, size = manifest["mesh"]["cells"], manifest["mesh"]["cell_size_mm"]
+        length_mm, width_mm = (cells[k] * size[k] for k in (0, 1))
+        light = red_green_sides(length_mm, width_mm, decay_mm=0.8 * width_mm)
+    seen = light.at(positions_mm[:, 0], positions_mm[:, 1]) @ light.colour
+    one_channel = is_mono(manifest["camera"])
+    return float((seen[:, 0] if one_channel else seen.sum(axis=1)).min())
 
 
 def _pitch(positions: Any) -> float:
@@ -215,6 +246,7 @@ def figures(
     marker_diameter_mm: float,
     skin_n_per_mm: float = 0.0,
     skin_friction: float | None = None,
+    least_light: float | None = None,
 ) -> SensorFigures:
     """Figures of a sensor.
 
@@ -229,6 +261,8 @@ def figures(
         marker_diameter_mm: of a usual dot.
         skin_n_per_mm: membrane stiffness of coat and fabric together.
         skin_friction: their friction against objects.
+        least_light: light on the darkest dot before the lens takes its part, over the mean of a
+            lamp and summed over the channels; None where it is not known.
 
     Raises:
         KeyError: the record lacks a value.
@@ -239,6 +273,7 @@ def figures(
     corners = list(product(*((-side / 2, side / 2) for side in size_mm[:2])))
     rays = [_ray(camera, (x, y, -lift)) for x, y in corners]
     images = [_images_mm(ray, stack, lift) for ray in rays]
+    half_view_px = max(ray.off_axis for ray in rays) * float(camera["focal_px"])
     return SensorFigures(
         length_mm=size_mm[0],
         width_mm=size_mm[1],
@@ -255,7 +290,7 @@ def figures(
         image_height_px=int(camera["image_height_px"]),
         near_mm=min(nearer for nearer, _ in images),
         far_mm=max(farther for _, farther in images),
-        half_view_px=max(ray.off_axis for ray in rays) * float(camera["focal_px"]),
+        half_view_px=half_view_px,
         tilt_deg=math.degrees(math.acos(min(1.0, float(camera["forward"][2])))),
         oblique_deg=max(math.degrees(ray.from_normal_rad) for ray in rays),
         layers_mm=stack,
@@ -265,6 +300,11 @@ def figures(
         wide_lens=lens.get("model") == "kannala_brandt",
         skin_n_per_mm=skin_n_per_mm,
         skin_friction=skin_friction,
+        least_light=(
+            LEAST_LIGHT
+            if least_light is None
+            else DULLEST * least_light / (1 + (half_view_px / float(camera["focal_px"])) ** 2) ** 2
+        ),
     )
 
 

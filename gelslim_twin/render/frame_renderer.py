@@ -240,17 +240,23 @@ class FrameRenderer:
         gain, step = _NONE, 1
         if self.look.shading is not None and surface is not None and surface.moves:
             assert self.shading_sight is not None
-            rest_mm = None if self.top is None else self.top.nodes_mm(surface)
-            gain = self.look.shading.gain(self.shading_sight, surface, self.light, rest_mm)
-            if self.top is not None:
-                gain = 1 + (gain - 1) * self._on_pad
-            step = self.look.shading.pixel_step
+            gain, step = self.gain(self.shading_sight, surface), self.look.shading.pixel_step
         colour, contrast = self.colour, self.contrast
 
         def write(top: int, out: Image) -> None:
             compose(self._planes, gain, step, ink, contrast, colour, self.glare, top, out)
 
         return write
+
+    def gain(self, sight: Sight, surface: SurfaceState) -> Image:
+        """Light (rows, columns, k) at rays over that at rest, where the look has shading.
+
+        `surface` has the crown of a crowned gel (`DomedTop.carrying`).
+        """
+        assert self.look.shading is not None
+        rest_mm = None if self.top is None else self.top.nodes_mm(surface)
+        gain = self.look.shading.gain(sight, surface, self.light, rest_mm)
+        return gain if self.top is None else 1 + (gain - 1) * self._on_pad(sight)
 
     def _picture(self, ink: Image, surface: SurfaceState | None, number: int) -> NDArray[np.uint8]:
         """The picture, composed in strips that fit into the processor's cache."""
@@ -289,12 +295,9 @@ class FrameRenderer:
         return lru_cache(maxsize=2)(partial(outlines_px, self.camera, self.dots))
 
     @cached_property
-    def _on_pad(self) -> Image:
+    def _on_pad(self) -> Callable[[Sight], Image]:
         """Share (rows, columns, 1) of pad at each ray: the frame around it is not crowned."""
-        assert self.shading_sight is not None
-        places = self.shading_sight.rest_mm
-        beyond = self.pad.beyond_mm(places[..., 0], places[..., 1])
-        return np.clip(1 - beyond, 0.0, 1.0).astype(np.float32)[..., None]
+        return lru_cache(maxsize=2)(self.pad.share_at)
 
     @cached_property
     def _rest_outlines(self) -> Array:

@@ -89,6 +89,11 @@ class Pad:
         distance: Array = outside + np.minimum(np.maximum(a, b), 0) - r
         return distance
 
+    def share_at(self, sight: Sight) -> NDArray[np.float32]:
+        """Share (rows, columns, 1) of pad at each ray of a lattice, falling over 1 mm around it."""
+        beyond = self.beyond_mm(sight.rest_mm[..., 0], sight.rest_mm[..., 1])
+        return np.clip(1 - beyond, 0.0, 1.0).astype(np.float32)[..., None]
+
 
 def still_irradiance(
     camera: VirtualCamera,

@@ -16,7 +16,7 @@ from gelslim_twin.planning.plan import Plan
 from gelslim_twin.render.look import Look, plan_camera, plan_look
 from gelslim_twin.scene.built_look import BuiltLook
 from gelslim_twin.scene.scene import Scene
-from gelslim_twin.simulation.sensor import TwinSensor
+from gelslim_twin.simulation.sensor import TwinSensor, nodes_to_markers
 from ifem_export.markers.interpolation import marker_to_node
 
 if TYPE_CHECKING:
@@ -63,6 +63,8 @@ class Viewer:
     @cached_property
     def to_markers(self) -> Any:
         """(m, c) from the surface nodes to the markers."""
+        if "marker_print" not in self.plan.order:
+            return nodes_to_markers(self.sensor.bundle)
         return marker_to_node(self.sensor.points_mm, self._printed_mm)
 
     @cached_property

@@ -24,13 +24,12 @@ from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.circumstances import PictureSizes
+from gelslim_twin.effects.dot_contrast import FLOOR_PX
 from gelslim_twin.effects.effect import Bound, picture, rounded_up
 from gelslim_twin.effects.grey_values import PIXEL_STEPS
 from gelslim_twin.planning.grey_sizes import (
-    FLOOR_PX,
     SHADING,
     is_finely_shaded,
-    least_light_px,
     picture_safety,
     usual_px,
 )
@@ -44,13 +43,8 @@ RUNG_SAFETY = 3.0
 """The same as `picture_safety` for the coarsest rung of shading."""
 PICTURE_DIGITS = 2
 """Significant digits of what is found: one pixel that is rounded otherwise moves a dot."""
-LIGHT_SAFETY, LIT = 2.0, 0.05
-"""Factor on the change of the light at the pose that is drawn, and the share of the usual light
-below which a pixel does not count."""
 WORTH_A_TRY = 3.0
 """Usual size over the tolerance up to which leaving an effect out is tried."""
-LIGHT_PICTURES = 1
-"""Pictures that the light with and without shading counts for, on the coarsest lattice."""
 FINE_STEP, FINE_PICTURES = 2, 2
 """Pixels from one value to the next of the fine rung of shading that a probe draws, a quarter of
 the coarsest, and the pictures that one with it counts for. Beside the safety factor, what the
@@ -70,13 +64,10 @@ class PictureProbe:
     Attributes:
         plan: The plan by bounds.
         viewer: How the sensor is seen by a plan.
-        edge_shift_px: Shift of a dot's edge that changes the light as much as a share of it, by
-            which the light of shading is judged.
     """
 
     plan: Plan
     viewer: Callable[[Plan], Viewer]
-    edge_shift_px: Callable[[float], float]
     _kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
     """Pictures by state and effects."""
     _kept_as: dict[Any, int] = field(default_factory=dict, init=False, repr=False)
@@ -108,12 +99,9 @@ class PictureProbe:
             # The rung of shading saves most of the time, so that it comes first.
             if self._may_size_rung and self._may_draw(1 + FINE_PICTURES, most_pictures):
                 found = replace(found, coarsest=self._coarsest(state))
-            more = 2 + LIGHT_PICTURES * (FINE_PICTURES if self._is_fine else 1)
-            promising = _jointly(found, least_light_px(self.plan), [SHADING])
-            if fits(promising) and self._may_draw(more, most_pictures):
-                light_px = self._light_px(state)
-                if fits(_jointly(found, light_px, [SHADING])):
-                    names = [*effects]
+            light_px = self.plan.choice(SHADING).size.image_px
+            if fits(_jointly(found, light_px, [SHADING])):
+                names = [*effects]
         names.sort(key=self._usual_px)
         names = [n for n in names if self._usual_px(n) <= WORTH_A_TRY * tolerance_px]
         best, count, grows = found, self._guessed(names, tolerance_px), True
@@ -185,19 +173,6 @@ class PictureProbe:
         px = None if dots is None else dots.shift_px(self._drawn(state, NOT_DRAWN, self._fine))
         return {} if px is None else {SHADING: _with_safety(px, RUNG_SAFETY)}
 
-    def _light_px(self, state: GelState) -> float:
-        """The largest change of the light by shading, as the shift of a dot's edge."""
-        sums = []
-        for without in (NOT_DRAWN, NOT_DRAWN | {SHADING}):
-            viewer = self._viewer(without, self._fine if self._is_fine else self._coarse)
-            camera = viewer.renderer.camera
-            bare = np.zeros((camera.image_height_px, camera.image_width_px), np.float32)
-            sums.append(viewer.renderer.values(bare, viewer.surface(state)).sum(axis=2))
-        lit = sums[0] > LIT * np.median(sums[0])
-        share = float((np.abs(sums[1] - sums[0])[lit] / sums[0][lit]).max(initial=0.0))
-        self._kept_as["light"] = LIGHT_PICTURES * (FINE_PICTURES if self._is_fine else 1)
-        return rounded_up(LIGHT_SAFETY * self.edge_shift_px(share), PICTURE_DIGITS)
-
     @cached_property
     def _coarse(self) -> Plan:
         """The plan with the coarsest rung of shading, with which all but that is drawn."""
@@ -238,8 +213,9 @@ def _with_safety(px: float, safety: float) -> Bound:
 
 
 def _jointly(known: PictureSizes, whole_px: float, names: Sequence[str]) -> PictureSizes:
-    """What is known with the common size of effects, in equal parts."""
-    return replace(known, together={name: picture(whole_px / len(names)) for name in names})
+    """What is known with the common size of effects, in equal parts that combine to it."""
+    part = picture(whole_px / math.sqrt(len(names)))
+    return replace(known, together=dict.fromkeys(names, part))
 
 
 @dataclass(frozen=True, eq=False)

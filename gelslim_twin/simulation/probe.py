@@ -12,13 +12,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.contact.corrected_contact import (
     Correction,
     LinearStep,
@@ -32,21 +30,23 @@ from gelslim_twin.contact.relaxation import at_rest, relax
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.effects.circumstances import CorrectedPose, MotionFigures, Probed
 from gelslim_twin.effects.contact import RelaxationParameters
-from gelslim_twin.effects.effect import OBSERVABLES, Bound, geometry, picture, rounded_up
-from gelslim_twin.effects.grey_values import MotionBlurParameters
+from gelslim_twin.effects.effect import OBSERVABLES, Bound, geometry, rounded_up
+from gelslim_twin.effects.grey_values import motion_blur_bound
 from gelslim_twin.effects.large_strain import RIM_NODES, RIM_PLACES
 from gelslim_twin.planning.planner import Question
 from gelslim_twin.planning.probed_path import pressed_poses, probed_poses, straight_poses
 from gelslim_twin.planning.probing import MOTION_BLUR
+from gelslim_twin.render.surface_state import NodeLattice
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
+from gelslim_twin.simulation.probed_dots import moving_dots
+from gelslim_twin.simulation.sensor import nodes_to_markers
 from gelslim_twin.tools.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
-from ifem_export.markers.interpolation import marker_to_node
 from ifem_export.operators.single_thread import single_threaded
 
-Pictured = Callable[[Question, GelState], Question]
-"""The question with what the picture of a state shows."""
+Pictured = Callable[[Question, Sequence[GelState]], Question]
+"""The question with what pictures of states show, of which the first has the largest force."""
 TOLERANCE = 1e-2
 """Of the contact: its error is a small part of the safety factors."""
 FORCE_SAFETY, FRICTION_SAFETY, PLACES_SAFETY = 1.25, 2.0, 2.0
@@ -59,10 +59,6 @@ of 102 random scenes, and places under large strain 1.38."""
 LEAST_FRICTION = 5e-3
 """What friction changes at least in a straight press, over the largest resultant and displacement:
 where it changes little at the deepest pose, it may change more on the way."""
-DOTS_SAFETY, SMOOTH_DOTS_SAFETY = 3.3, 1.75
-"""Factors on the speed of the images of dots between these poses, and for straight presses by tools
-without walls. In 171 random scenes 3.0 was needed, where a wall lets go of the gel (seed 3209),
-and 1.57 without walls."""
 LEAST_OVERLAP = 0.7
 """Overlap of the tool with the nodes at the poses of a probe over that at any pose: below it, the
 sizes found say little about the path. In seed 2334 a wall that met two nodes at one pose and none
@@ -89,7 +85,8 @@ def probed(
         compliance: Compliance of the pad, which keeps the columns that it computes.
         effects: Which of `probing.PROBED` to size.
         milliseconds: Declared time of the probe.
-        pictured: Adds what the picture of the hardest pose shows of effects on its grey values.
+        pictured: Adds what pictures show of effects on grey values, of the pose with the largest
+            force and, where the tool moves aside, of that with the steepest gel.
 
     Returns:
         The question, unchanged where the contact of a pose is not solved, and where the tool
@@ -105,7 +102,7 @@ def probed(
         apart = replace(here, motion=MotionFigures(here.motion.poses), probed=none)
         known = replace(asked, circumstances=apart)
         return (
-            known if pictured is None else pictured(known, GelState.at_rest(len(probe.points_mm)))
+            known if pictured is None else pictured(known, [GelState.at_rest(len(probe.points_mm))])
         )
     poses = probe.poses(loaded, MOTION_BLUR in effects)
     if not probe.are_hardest(poses, loaded.poses):
@@ -127,10 +124,9 @@ def probed(
             sizes["nonlinearity"] = sizes["nonlinearity"].plus(rim)
     if "relaxation" in effects:
         sizes["relaxation"] = Bound(force_n=probe.lost_n(steps, loaded.poses[0].time_s))
-    dot_mm_s = math.inf
-    if MOTION_BLUR in effects:
-        dot_mm_s = probe.dot_mm_s(steps)
-        sizes[MOTION_BLUR] = probe.smear(dot_mm_s)
+    dots_px = dot_mm_s = math.inf
+    if MOTION_BLUR in effects and {"markers", "image"} & {*asked.observe}:
+        dots_px, dot_mm_s = moving_dots(asked.circumstances, compliance.bundle, steps)
     forces = [step.state.force_n.sum(axis=0) for step in steps]
     found = Probed(
         rounded_up(max(-float(force[2]) for force in forces)),
@@ -140,11 +136,16 @@ def probed(
         milliseconds,
         dot_mm_s=dot_mm_s,
         corrected=tuple(probe.corrected_pose(*pair) for pair in hard),
+        dots_px=dots_px,
     )
     if found.normal_n <= 0:
         return asked
-    known = replace(asked, circumstances=replace(asked.circumstances, probed=found))
-    return known if pictured is None else pictured(known, _hardest(steps)[0].state)
+    here = replace(asked.circumstances, probed=found)
+    if MOTION_BLUR in effects:
+        found = replace(found, sizes={**sizes, MOTION_BLUR: motion_blur_bound(here)})
+        here = replace(here, probed=found)
+    known = replace(asked, circumstances=here)
+    return known if pictured is None else pictured(known, probe.drawn(steps))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +169,20 @@ class _Probe:
             return pressed_poses(loaded.poses, straight_poses(c), with_fastest)
         reach_mm = c.footprint.reach_mm(c.contact.depth_mm) if with_fastest else None
         return probed_poses(loaded.poses, reach_mm)
+
+    def drawn(self, steps: Sequence[LinearStep]) -> list[GelState]:
+        """The state with the largest force, and where the tool moves aside the steepest one."""
+        pressed = _most_pressed(steps).state
+        if self.asked.circumstances.motion.is_straight:
+            return [pressed]
+        lattice = NodeLattice.of(self.points_mm)
+
+        def steepest_mm(state: GelState) -> float:
+            heights_mm = lattice.state(state.displacement_mm).displacement_mm[..., 2]
+            return max(float(np.abs(np.diff(heights_mm, axis=k)).max()) for k in (0, 1))
+
+        steepest = max((step.state for step in steps), key=steepest_mm)
+        return [pressed] if steepest is pressed else [pressed, steepest]
 
     def are_hardest(self, poses: Sequence[Pose], path: Sequence[Pose]) -> bool:
         """Whether the tool overlaps the nodes at some of these poses about as much as anywhere.
@@ -231,36 +246,6 @@ class _Probe:
             worst = max(worst, float(np.linalg.norm((elastic - relaxed).sum(axis=0))))
         return rounded_up(RELAXED_SAFETY * (1 + c.contact.nonlinear_excess) * worst)
 
-    def dot_mm_s(self, steps: Sequence[LinearStep]) -> float:
-        """Largest speed of a dot between two of these poses, with the safety factor.
-
-        It is that of its image over the scale: a camera hardly sees a dot that moves towards it.
-        """
-        if self._to_markers is None:
-            return math.inf
-        bundle, speeds_px = self.compliance.bundle, [0.0]
-        assert bundle.markers is not None
-        heights = self._to_markers @ np.asarray(bundle.mesh.surface_mm)[:, 2]
-        rest_mm = np.column_stack([bundle.markers.positions_mm, heights])
-        camera = VirtualCamera.from_record(bundle.camera)
-        for one, other in pairwise(steps):
-            before_px, px = (
-                camera.project(rest_mm + self._to_markers @ step.state.displacement_mm)
-                for step in (one, other)
-            )
-            way_px = float(np.linalg.norm(px - before_px, axis=1).max(initial=0.0))
-            speeds_px.append(way_px / (other.pose.time_s - one.pose.time_s))
-        c = self.asked.circumstances
-        smooth = c.motion.is_straight and not c.has_walls
-        safety = SMOOTH_DOTS_SAFETY if smooth else DOTS_SAFETY
-        return rounded_up(safety * max(speeds_px) / c.sensor.px_per_mm)
-
-    def smear(self, dot_mm_s: float) -> Bound:
-        """Size of motion blur at a speed of the dots: how far a smeared dot lags behind."""
-        c = self.asked.circumstances
-        open_s = c.given(MOTION_BLUR, MotionBlurParameters).shutter_ms / 1000
-        return picture(rounded_up(dot_mm_s * open_s * c.sensor.px_per_mm / 2))
-
     def rim(self, states: Iterable[GelState]) -> Bound:
         """What nodes at the walls of the tool may differ by besides."""
         shares = [
@@ -278,7 +263,7 @@ class _Probe:
         bundle = self.compliance.bundle
         if bundle.markers is None or not {"markers", "image"} & {*self.asked.observe}:
             return None
-        return marker_to_node(bundle.mesh.surface_mm, bundle.markers.positions_mm)
+        return nodes_to_markers(bundle)
 
     def friction(self, held: Sequence[GelState], free: Sequence[GelState]) -> Bound:
         """Size of friction, from states with and without it."""
@@ -337,6 +322,11 @@ class _Probe:
             rounded_up(scale * float(np.abs(strained.displacement_mm).max())),
             rounded_up(float(np.linalg.norm(strained.force_n.sum(axis=0)))),
         )
+
+
+def _most_pressed(steps: Sequence[LinearStep]) -> LinearStep:
+    """The step with the largest force."""
+    return max(steps, key=lambda step: float(np.linalg.norm(step.state.force_n.sum(axis=0))))
 
 
 def _hardest(steps: Sequence[LinearStep]) -> list[LinearStep]:

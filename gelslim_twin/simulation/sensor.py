@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from gelslim_optics.camera.record import is_mono
 from gelslim_twin.simulation.run_folder import SimulationError
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.files import load_bundle, write_bundle
+from ifem_export.errors import IfemError
 
 if TYPE_CHECKING:
     from gelslim_optics.light.light_map import LightMap
@@ -82,6 +83,19 @@ class TwinSensor:
         length, width = self.size_mm
         light = red_green_sides(length, width, decay_mm=0.8 * width)
         return replace(light, colour=np.ones((2, 3))) if self.mono else light
+
+
+@lru_cache(maxsize=2)
+def nodes_to_markers(bundle: Bundle) -> Any:
+    """Matrix (m, c) from the surface nodes to the markers as designed, kept for the last sensors.
+
+    Raises IfemError for a bundle without markers.
+    """
+    from ifem_export.markers.interpolation import marker_to_node
+
+    if bundle.markers is None:
+        raise IfemError("the bundle has no markers")
+    return marker_to_node(bundle.mesh.surface_mm, bundle.markers.positions_mm)
 
 
 BUNDLE, RECORD = "bundle", "sensor.json"

@@ -50,6 +50,13 @@ class Outcome:
         """Images (m, 2) of the dots' centres at a pose."""
         return self.viewer.markers_px(self.states[at])
 
+    @property
+    def printed(self) -> NDArray[np.bool_]:
+        """Which dots (m,) the print has; all where nothing sees it."""
+        if "marker_print" not in self.plan.order:
+            return np.ones(len(self.viewer.sensor.grid.positions_mm), dtype=bool)
+        return self.viewer.renderer.dots.present
+
     def step_s(self, at: int) -> float:
         """Time since the pose before; 0 for the first."""
         return self.times_s[at] - self.times_s[at - 1] if at else 0.0
@@ -160,6 +167,10 @@ class Trial:
             at = int(np.argmax([np.abs(a.force_n).sum() for a, _ in pairs]))
             frames = {at, self._fastest(one), len(pairs) - 1}
             found["image"] = seen_apart_px(one, other, frames, doubtful)
+        if not np.array_equal(one.printed, other.printed):
+            # A dot that is there in one of them only is off by the distance to the next.
+            pitch_px = scale * self.asked.circumstances.sensor.marker_pitch_mm
+            found |= {o: max(found[o], pitch_px) for o in ("markers", "image") if o in found}
         return found
 
     def _fastest(self, one: Outcome) -> int:

@@ -52,6 +52,20 @@ def apart(one: list[GelState], other: list[GelState]) -> tuple[float, float]:
     )
 
 
+def test_what_a_probe_corrects_leaves_no_trace_in_a_run() -> None:
+    """The linear stiffness is shared by corrections of one pad, solvers are not: equal bytes."""
+    solver = ball()
+    state = solver.step(GelState.at_rest(len(solver.points_mm)), None, PRESS)
+    still = np.zeros_like(solver.points_mm)
+    alone = Correction(solver.compliance.bundle).offset_mm(state, still)
+    other = Correction(solver.compliance.bundle, tolerance=1e-3)
+    other.offset_mm(state, still)
+    again = Correction(solver.compliance.bundle)
+    assert np.array_equal(again.offset_mm(state, still), alone)
+    assert again._law.system is other._law.system
+    assert again._solver is not other._solver
+
+
 def in_small_steps(seed: int, folder: Path) -> Trial:
     """A random contact whose tool moves in four times as many steps."""
     finger, values = random_contact(seed)

@@ -24,7 +24,7 @@ from PIL import Image
 from scipy.optimize import minimize_scalar
 from scipy.stats import rayleigh
 
-from gelslim_twin.effects import dot_contrast, grey_values
+from gelslim_twin.effects import dot_contrast, grey_values, image_noise
 from gelslim_twin.effects.circumstances import MotionFigures
 from gelslim_twin.effects.dot_contrast import (
     DefocusParameters,
@@ -36,10 +36,10 @@ from gelslim_twin.effects.effect import Bound, optics, picture
 from gelslim_twin.effects.grey_values import (
     CompressionParameters,
     DirtParameters,
-    SensorNoiseParameters,
     ShadingParameters,
     SpecularParameters,
 )
+from gelslim_twin.effects.image_noise import SensorNoiseParameters
 
 LENS = (("k1", -0.13), ("k2", 0.05), ("p1", 0.004), ("p2", -0.003), ("k3", -0.02))
 
@@ -182,7 +182,14 @@ def test_exposure_changes_an_edge_by_gain_and_tone(time: float, gain: float, gam
     changed = abs(time * gain - 1) - float(least.fun)
     c = circumstances(exposure=ExposureParameters(time=time, gain=gain, gamma=gamma))
     edge_px = math.hypot(1.0, c.blur_px)
-    same(BOUND["exposure"](c), picture(edge_px * min(1.0, changed)))
+    noise_px = BOUND["sensor_noise"](c).image_px
+    assert noise_px > 0
+    same(BOUND["exposure"](c), picture(min(1.0, changed) * min(edge_px, 0.4 * edge_px + noise_px)))
+    dirty = circumstances(
+        exposure=ExposureParameters(time=time, gain=gain, gamma=gamma),
+        dirt=DirtParameters(specks=1),
+    )
+    same(BOUND["exposure"](dirty), picture(edge_px * min(1.0, changed)))
     assert IS_NULL["exposure"](c) is (time == gain == gamma == 1)
     assert dot_contrast.toned(0.3, gamma) == pytest.approx(0.3 ** (1 / gamma))
     assert dot_contrast.toned(1.7, gamma) == 1
@@ -200,14 +207,17 @@ def test_noise_is_that_of_electrons_in_three_channels(read: float) -> None:
     rng = np.random.default_rng(8)
     channels = rng.poisson(electrons / 3, (3, 200_000)) + read * rng.standard_normal((3, 200_000))
     drawn = channels.sum(axis=0).std() / electrons
-    share = grey_values.sigma_share(c)
+    share = image_noise.sigma_share(c)
     assert share == pytest.approx(float(drawn), rel=0.01)
     assert share == pytest.approx(math.sqrt(1 / electrons + 3 * (read / electrons) ** 2))
     edge_px = math.hypot(1.0, c.blur_px)
-    same(BOUND["sensor_noise"](c), picture(min(0.6 * SCALE, edge_px * 3 * share / 0.6)))
+    wide_px = edge_px * 3 * share / 0.6
+    assert 0 < BOUND["sensor_noise"](c).image_px <= wide_px
+    dirt = {**c.parameters, "dirt": DirtParameters(specks=1)}
+    same(BOUND["sensor_noise"](replace(c, parameters=dirt)), picture(min(0.6 * SCALE, wide_px)))
     assert not IS_NULL["sensor_noise"](c)
     quiet = circumstances(sensor_noise=SensorNoiseParameters(full_well_electrons=0.0))
-    assert grey_values.sigma_share(quiet) == 0
+    assert image_noise.sigma_share(quiet) == 0
     assert IS_NULL["sensor_noise"](quiet)
 
 
@@ -267,7 +277,7 @@ def test_dirt_hides_by_its_width_and_opacity(
     )
     apart_px = (0.6 + wide_mm) / 2 * SCALE
     hidden_px = opacity / 0.25 * wide_mm * SCALE
-    same(BOUND["dirt"](c), picture(min(hidden_px, apart_px)))
+    same(BOUND["dirt"](c), picture(2 / math.pi * min(hidden_px, apart_px)))
     assert IS_NULL["dirt"](c) is (not given or opacity == 0)
 
 
@@ -280,7 +290,7 @@ def test_a_spot_adds_its_tint_up_to_its_width(percent: float, radius_px: float) 
     )
     added = percent / 100 * 255 * (1 + 0.5 + 0.5)
     shift_px = dot_contrast.edge_px(c) * added / (0.5 * 0.35 * 120)
-    same(BOUND["specular"](c), picture(min(shift_px, 0.6 * SCALE, 3 * radius_px)))
+    same(BOUND["specular"](c), picture(2 / math.pi * min(shift_px, 0.6 * SCALE, 3 * radius_px)))
     assert not IS_NULL["specular"](c)
 
 

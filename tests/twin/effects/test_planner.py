@@ -154,8 +154,8 @@ def test_random_scenes_keep_the_tolerance(tmp_path, seed):
     spoilt = {o for c in plan.choices if c.over_share for o in c.over_share}
     for observable in plan.observe:
         errors = {c.effect: c.error.of(observable) for c in plan.choices if c.shares}
-        grey = sum(error for name, error in errors.items() if name in GREY)
-        total = math.hypot(sum(errors.values()) - grey, grey)
+        grey = [error for name, error in errors.items() if name in GREY]
+        total = math.hypot(sum(errors.values()) - sum(grey), *grey)
         assert total == pytest.approx(plan.error(observable))
         if observable not in spoilt:
             assert total <= allowed[observable] * (1 + 1e-9)
@@ -363,12 +363,14 @@ def test_scattered_errors_add_to_others_as_independent_ones_do() -> None:
         )
         asked = _ask((base, *others), 1.0)
         share = {o: _shares(asked, (base, *others))[o] for o in asked.observe}["image"]
-        steady, scattered = share * kinds.count(False), share * kinds.count(True)
-        assert math.sqrt(steady**2 + scattered**2) == pytest.approx(1.0)
+        steady, scattered = share * kinds.count(False), share**2 * kinds.count(True)
+        assert math.sqrt(steady**2 + scattered) == pytest.approx(1.0)
         plan = make_plan(asked, (base, *others))
         errors = [plan.choice(e.name).error.image_px for e in others]
-        sums = [sum(e for e, s in zip(errors, kinds, strict=True) if s == kind) for kind in (0, 1)]
-        assert math.sqrt(sums[0] ** 2 + sums[1] ** 2) <= 1.0 + 1e-12
+        pairs = list(zip(errors, kinds, strict=True))
+        steady = sum(e for e, is_scattered in pairs if not is_scattered)
+        squares = sum(e * e for e, is_scattered in pairs if is_scattered)
+        assert math.sqrt(steady**2 + squares) <= 1.0 + 1e-12
         above += sum(errors) > 1.0
     assert above > 10
 
@@ -378,7 +380,7 @@ def test_what_goes_together_leaves_the_others_their_shares(seed: int) -> None:
     rng = random.Random(seed)
     gone, steady, scattered = rng.uniform(0, 1), rng.randint(0, 5), rng.randint(0, 5)
     share = _equal_share(1.0, gone, steady, scattered)
-    used = math.hypot(steady * share, gone + scattered * share)
+    used = math.hypot(steady * share, gone, *(scattered * [share]))
     assert used == pytest.approx(1.0) or not (steady or scattered)
     assert _equal_share(1.0, 1.2, steady, scattered) == 0.0
 
@@ -444,23 +446,24 @@ def test_the_budgets_choice_of_rungs_is_the_cheapest_within_the_shares() -> None
 
 def test_effects_found_small_together_are_left_out_together_or_not_at_all(tmp_path):
     """Their common size holds for all of them and not for some."""
-    text = observing("image") + "tolerance: {image_px: 0.6}\neffects: {exposure: {gain: 1.4}}\n"
+    text = observing("image") + "tolerance: {image_px: 0.2}\neffects: {exposure: {gain: 1.4}}\n"
     asked = question(load(tmp_path, text), SENSOR)
     bounded = make_plan(asked)
     names = ("shading", "defocus", "exposure", "sensor_noise")
     assert {*names} <= {*bounded.order}
 
     def planned_with(whole_px: float | None) -> Plan:
-        parts = {} if whole_px is None else {n: picture(whole_px / len(names)) for n in names}
+        parts = {} if whole_px is None else {n: picture(whole_px / 2) for n in names}
         found = Probed(0.2, 0.2, 0.2, {}, together=parts)
         here = replace(asked.circumstances, probed=found)
         return make_plan(replace(asked, circumstances=here))
 
-    small, large = planned_with(0.3), planned_with(1.1)
+    small, large = planned_with(0.1), planned_with(0.4)
     assert not {*names} & {*small.order}
     assert {small.choice(name).why for name in names} == {"small with others"}
-    assert sum(small.choice(name).error.image_px for name in names) == pytest.approx(0.3)
-    assert 0.3 <= small.error("image") <= 0.6
+    # Four equal parts of scattered errors: half of the whole each.
+    assert math.hypot(*(small.choice(n).error.image_px for n in names)) == pytest.approx(0.1)
+    assert 0.1 <= small.error("image") <= 0.2
     assert not small.over_tolerance
     assert small.predicted_ms < bounded.predicted_ms
     assert large.choices == planned_with(None).choices
@@ -479,7 +482,7 @@ def test_what_a_scene_switches_off_does_not_excuse_what_is_left_out_together(tmp
     assert dict(bounded.over_tolerance)["image"] > 0.6
     names = ("shading", "defocus", "exposure", "sensor_noise")
     for whole_px, fits in ((0.3, True), (1.1, False)):
-        parts = {n: picture(whole_px / len(names)) for n in names}
+        parts = {n: picture(whole_px / 2) for n in names}
         found = Probed(0.2, 0.2, 0.2, {}, together=parts)
         known = replace(asked, circumstances=replace(asked.circumstances, probed=found))
         assert are_left_out(known) == fits
