@@ -62,9 +62,9 @@ the contact, where that becomes larger again after a release."""
 MOST_CORRECTIONS = 6
 CONVERGED, CONVERGED_SHARE, CONVERGED_STEPS = 1e-2, 0.2, 40
 """Largest tolerance of `NonlinearContact` where corrections do not converge, as a share of the
-tolerance here, and most iterations at a pose. Where these do not converge either, smaller load
-steps are taken, which is another path of friction: of a cone that slides over 9 nodes, 5 % of the
-displacement after 25 iterations that would have converged later."""
+tolerance here, and most iterations at a pose. Where these do not converge either, that contact
+takes smaller load steps, which are another path of friction. With 25 iterations it did so under a
+sliding cone, and the gel was 5 % of its displacement beside that of one step per pose."""
 
 
 @dataclass(frozen=True, eq=False)

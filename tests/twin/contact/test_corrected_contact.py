@@ -18,6 +18,7 @@ from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
+from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.large_strain import (
     CORRECTED_RUNGS,
     HELD_AT,
@@ -72,6 +73,14 @@ def in_small_steps(seed: int, folder: Path) -> Trial:
     for move in values["motion"]["waypoints"]:
         move["steps"] *= 4
     return Trial.of(finger, values, folder)
+
+
+def probed_contact(seed: int, folder: Path) -> tuple[Trial, Circumstances, Tool]:
+    """Such a contact, what is known of it after a probe, and its tool."""
+    one = in_small_steps(seed, folder)
+    asked = replace(one.asked, observe=("force", "displacement"))
+    c = probed(asked, one.loaded, one.compliance, ("nonlinearity",)).circumstances
+    return one, c, Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
 
 
 @pytest.mark.slow
@@ -208,10 +217,7 @@ def test_rungs_keep_what_one_correction_tells_of_them(tmp_path: Path, seed: int)
     and 3180 it moves aside. 3102 and later seeds were not looked at for the safety factors, but
     for 3238, in which 1.84 was needed.
     """
-    one = in_small_steps(seed, tmp_path)
-    asked = replace(one.asked, observe=("force", "displacement"))
-    c = probed(asked, one.loaded, one.compliance, ("nonlinearity",)).circumstances
-    tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
+    one, c, tool = probed_contact(seed, tmp_path)
 
     def solver() -> ContactSolver:
         return ContactSolver(one.compliance, tool, ContactSettings(1e-5, c.friction))
@@ -260,10 +266,7 @@ def test_rungs_keep_their_error_along_random_paths(tmp_path: Path, seed: int) ->
 def test_rungs_keep_what_a_probe_says_of_strained_contacts(tmp_path: Path, seed: int) -> None:
     """In 3209 and 3214 a wall holds a node otherwise at one pose of a deep press, at 3205 and 3231
     by less; in 3208 a ball that is pressed in by 39 % slides on a gel of ν = 0.47."""
-    one = in_small_steps(seed, tmp_path)
-    asked = replace(one.asked, observe=("force", "displacement"))
-    c = probed(asked, one.loaded, one.compliance, ("nonlinearity",)).circumstances
-    tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
+    one, c, tool = probed_contact(seed, tmp_path)
 
     def solver() -> ContactSolver:
         return ContactSolver(one.compliance, tool, ContactSettings(1e-4, c.friction))
