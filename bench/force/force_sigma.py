@@ -106,9 +106,9 @@ class DeepSlice:
 
 @dataclass(frozen=True)
 class StrongSlice:
-    """Presses of 0.2 N or more that one process scores by a gel, with the folder for contacts."""
+    """Presses of 0.2 N or more that one process scores by some knowledge of the sensor."""
 
-    gel: str
+    known: str
     seeds: tuple[int, ...]
     kept: Path
 
@@ -157,23 +157,23 @@ def _path(some: Slice, mode: str) -> Path:
 
 
 def strong_scored(options: argparse.Namespace) -> dict[str, Any]:
-    """Scores and relative errors of strong presses by what is known of the gel."""
+    """Scores and relative errors of strong presses by what is known of the sensor."""
     from frame_errors import error_summary
-    from press_gate import GELS, press_seeds
+    from press_gate import KNOWLEDGE, press_seeds
 
     options.kept.mkdir(parents=True, exist_ok=True)
     seeds = press_seeds(options.cases)
     slices = [
-        StrongSlice(gel, tuple(seeds[first : first + SLICE]), options.kept)
-        for gel in GELS
+        StrongSlice(known, tuple(seeds[first : first + SLICE]), options.kept)
+        for known in KNOWLEDGE
         for first in range(0, len(seeds), SLICE)
     ]
     scores = dict(Engine(options.processes).run(score_strong_slice, slices))
     found = {}
-    for gel in GELS:
-        some = [s for k, part in enumerate(slices) if part.gel == gel for s in scores[k]]
+    for known in KNOWLEDGE:
+        some = [s for k, part in enumerate(slices) if part.known == known for s in scores[k]]
         errors = {key: four_digits(value) for key, value in error_summary(some).items()}
-        found[gel] = {**recorded((vars(s.score) for s in some), ERRORS), "relative": errors}
+        found[known] = {**recorded((vars(s.score) for s in some), ERRORS), "relative": errors}
     return found
 
 
@@ -182,7 +182,7 @@ def score_strong_slice(some: StrongSlice) -> tuple[Any, ...]:
     see_tests("force")
     from press_gate import press_errors
 
-    return tuple(press_errors(some.gel, some.seeds, some.kept))
+    return tuple(press_errors(some.known, some.seeds, some.kept))
 
 
 def deep_scored(processes: int) -> dict[str, Any]:
@@ -246,7 +246,7 @@ def _strong_table(rows: Record) -> list[str]:
         "errors with their sign and its standard deviation; shear is relative to F_z, the field is "
         "that of the nodal forces.",
         "",
-        "| gel | presses | refused | F_z, median | 95th percentile | mean | shear | "
+        "| known | presses | refused | F_z, median | 95th percentile | mean | shear | "
         "centre of pressure | field | RMS of error/σ | within 1.96 σ |",
         "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]

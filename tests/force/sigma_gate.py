@@ -56,7 +56,7 @@ class Score:
 
 
 @cache
-def _gel(wide: bool = False) -> BuiltGel:
+def linear_gel(wide: bool = False) -> BuiltGel:
     """The gel as specified; its share of the covariance is that of a gel whose law is linear."""
     gel = built_gel(specified_bundle(wide), calibration(), None, PipelineSettings(gel="auto"))
     assert gel.share is not None
@@ -66,7 +66,7 @@ def _gel(wide: bool = False) -> BuiltGel:
 @cache
 def nothing_given(wide: bool = False) -> ForcePipeline:
     """Forces by light and markers, on a gel as specified."""
-    bundle, gel = specified_bundle(wide), _gel(wide)
+    bundle, gel = specified_bundle(wide), linear_gel(wide)
     source = unknown_shape(
         bundle,
         calibration(),
@@ -80,13 +80,13 @@ def nothing_given(wide: bool = False) -> ForcePipeline:
 
 @cache
 def _depth_given() -> ForcePipeline:
-    return ForcePipeline(specified_bundle(), calibration(), _LINEAR, gel=_gel().share)
+    return ForcePipeline(specified_bundle(), calibration(), _LINEAR, gel=linear_gel().share)
 
 
 @cache
 def _ball_given(radius_mm: float) -> ForcePipeline:
-    source = normal_source(_gel(), reference().image, f"sphere:{radius_mm:g}")
-    return ForcePipeline(specified_bundle(), calibration(), _LINEAR, source, _gel().share)
+    source = normal_source(linear_gel(), reference().image, f"sphere:{radius_mm:g}")
+    return ForcePipeline(specified_bundle(), calibration(), _LINEAR, source, linear_gel().share)
 
 
 def contact_of(mode: str, seed: int) -> Contact:
