@@ -40,6 +40,10 @@ def wrench_spread(
     covariance = at_edge(state.force_n, estimator.points_mm, estimator.near_edge, settings)
     by_motion, height = markers.by_motion(spread), state.displacement_mm[:, 2]
     by_marker = markers.response(by_motion, estimator.markers.mm_per_px)
+    dent = estimator.nodes_to_markers @ height
+    apparent = settings.height_share * estimator.by_height * dent[:, None]
+    apparent *= min(-float(dent.min(initial=0.0)) / estimator.deep_mm, 1.0)
+    covariance += by_heights(by_motion, apparent[markers.used])
     by_gel = None
     if off_design is not None:
         data = markers.used, by_motion, state.light, spread
@@ -47,10 +51,6 @@ def wrench_spread(
     if estimator.light is not None:
         varied = int(np.count_nonzero(sought.free))
         covariance += spread @ sought.sums.T - markers.overstated(by_motion, varied)
-        dent = estimator.nodes_to_markers @ height
-        apparent = settings.height_share * estimator.by_height * dent[:, None]
-        apparent *= min(-float(dent.min(initial=0.0)) / estimator.deep_mm, 1.0)
-        covariance += by_heights(by_motion, apparent[markers.used])
         return covariance, by_marker, by_gel
     force = state.force_n[nodes]
     covariance += scaled_covariance(equations.hessian, markers, sought.sums, spread, force.ravel())

@@ -95,12 +95,13 @@ def total(found: JointForces) -> Array:
     return np.concatenate([found.force_n.sum(axis=0), torque])
 
 
-def pushed(lean: float = 0.0, parameter: int | None = None) -> Array:
+def pushed(lean: float = 0.0, parameter: int | None = None, deeper: float = 0.0) -> Array:
     """(n, 2) markers in the picture under a push with shear.
 
     Args:
         lean: Lateral motion in x per mm of height that the picture shows in addition.
         parameter: Of `gel().more`, for a gel with more of it.
+        deeper: Error of all heights, as a share of them.
     """
     view, estimator = by_markers().estimator.markers, by_markers().estimator
     force = np.zeros_like(estimator.points_mm)
@@ -109,6 +110,7 @@ def pushed(lean: float = 0.0, parameter: int | None = None) -> Array:
     bundle = specified_bundle() if parameter is None else gel().more[parameter][0]
     moved = bundle.surface_operator("factor").displacement(force)
     now = view.rest_mm + estimator.nodes_to_markers @ moved
+    now[:, 2] += deeper * (now[:, 2] - view.rest_mm[:, 2])
     now[:, 0] += lean * (now[:, 2] - view.rest_mm[:, 2])
     return np.asarray(view.camera.project(now))
 
@@ -141,3 +143,22 @@ def test_forces_change_with_the_lean_of_the_view_as_their_covariance_says() -> N
     sigma = np.sqrt(np.diag(more.covariance - less.covariance))
     change = np.abs(total(of_positions(pushed(LEAN))) - total(of_positions(positions)))
     assert change[0] == pytest.approx(sigma[0], rel=0.15)
+
+
+@pytest.mark.slow
+def test_forces_change_with_heights_that_are_off_together_as_their_covariance_says() -> None:
+    """Twice as deep as the contact, a deep one, so that half of the share of the heights counts."""
+    estimator = by_markers().estimator
+    positions = pushed()
+    still = of_positions(positions)
+    depth_mm = -float((estimator.nodes_to_markers @ still.displacement_mm[:, 2]).min())
+    deep = replace(estimator, deep_mm=2 * depth_mm)
+    found = deep.estimate(deep.frame(NONE, positions, 0.005))
+    assert found is not None
+    np.testing.assert_array_equal(found.force_n, still.force_n)
+    share = estimator.settings.height_share / 2
+    sigma = np.sqrt(np.diag(found.covariance - still.covariance))
+    # With a third of it the same nodes press.
+    change = 3 * np.abs(total(of_positions(pushed(deeper=share / 3))) - total(still))
+    assert sigma[0] > 2e-5
+    np.testing.assert_allclose(change[[0, 2, 3, 4, 5]], sigma[[0, 2, 3, 4, 5]], rtol=0.15)
