@@ -14,13 +14,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import MeshError
-from ifem_export.mesh.alignment import aligned_start, points_in_plane
 from ifem_export.mesh.crop import (
     DEFAULT_FLOOR,
     CropReport,
@@ -37,9 +35,9 @@ from ifem_export.mesh.lattice import (
     node_sets,
     number_nodes,
 )
+from ifem_export.mesh.lattice_box import LatticeBox, lattice_box
 from ifem_export.mesh.outline import Outline
 
-_MAX_CELLS = 10_000_000
 _ARRAYS = ("nodes_mm", "hexes", "bonded", "surface", "sides", "occupancy", "fill", "surface_shift")
 
 
@@ -221,106 +219,59 @@ def build_pad_mesh(
         MeshError: A size is out of range, the lattice has too many cells, or no cell is inside
             the outline.
     """
-    if not math.isfinite(thickness_mm) or thickness_mm <= 0.0:
-        raise MeshError(
-            f"thickness_mm = {thickness_mm!r}: must be a finite number > 0",
-            field="thickness_mm",
-            value=thickness_mm,
-        )
-    x_min, y_min, x_max, y_max = outline.bounds_mm
-    extent = np.array([x_max - x_min, y_max - y_min])
-    pitch, n_across, n_layers = _lattice_pitch(extent, cells, pitch_mm, layers)
-    centre = np.array([x_min + x_max, y_min + y_max]) / 2.0
-    start = centre - n_across * pitch / 2.0
-    aligned, error = 0, 0.0
-    if align_to_mm is not None:
-        points = points_in_plane(align_to_mm, "align_to_mm")
-        start, aligned, error = aligned_start(points, start, pitch)
-    # With one spare cell on each side the box contains the gel, however the lattice is shifted.
-    low = np.floor((np.array([x_min, y_min]) - start) / pitch).astype(int) - 1
-    high = np.ceil((np.array([x_max, y_max]) - start) / pitch).astype(int) + 1
-    _check_count(high - low, n_layers)
-    hz = thickness_mm / n_layers
-    x = np.asarray(start[0] + np.arange(low[0], high[0] + 1) * pitch[0], dtype=np.float64)
-    y = np.asarray(start[1] + np.arange(low[1], high[1] + 1) * pitch[1], dtype=np.float64)
-    z = np.asarray(np.arange(-n_layers, 1) * hz, dtype=np.float64)
-    occupancy, fill = filled_cells(outline, crown, (x, y, z), weighting, floor)
+    box = lattice_box(outline, thickness_mm, cells, pitch_mm, layers, align_to_mm)
+    occupancy, fill = filled_cells(outline, crown, box.planes_mm, weighting, floor)
     if not occupancy.any():
-        raise _no_cell(pitch, weighting, floor)
+        raise _no_cell(box.cell_mm, weighting, floor)
     kept = keep_bonded_part(occupancy)
     share = None if fill is None else np.where(kept, fill, 0.0)
-    window, first = _trim(kept)
-    corner = start + (low + first) * pitch
-    mesh = PadMesh.from_occupancy(
-        np.ascontiguousarray(kept[window]),
-        (pitch[0], pitch[1], hz),
-        (corner[0], corner[1], -thickness_mm),
-        None if share is None else share[window],
-    )
+    flat = _cropped(box, thickness_mm, kept, share)
     plan = kept.any(axis=2) if share is None else share.max(axis=2)
     report = CropReport(
         n_cells_inside=int(occupancy.sum()),
         n_cells_kept=int(kept.sum()),
         outline_area_mm2=outline.area_mm2,
-        mesh_area_mm2=float(plan.sum() * pitch[0] * pitch[1]),
-        aligned_points=aligned,
-        alignment_error_mm=error,
+        mesh_area_mm2=float(plan.sum() * box.cell_mm[0] * box.cell_mm[1]),
+        aligned_points=box.aligned_points,
+        alignment_error_mm=box.alignment_error_mm,
     )
-    mesh = _with_exact_faces(mesh, thickness_mm)
     if crown is None:
-        return mesh, report
-    require_thick(outline, crown, thickness_mm, n_layers, (x, y))
+        return flat, report
+    require_thick(outline, crown, thickness_mm, flat.layers, (box.x, box.y))
     if weighting == "cell_centre":
-        return mesh.crowned(None), report
-    levels = crown_levels(crown, mesh.occupancy.shape, mesh.origin_mm, mesh.cell_size_mm)
-    return mesh.crowned(levels), report
+        return flat.crowned(None), report
+    levels = crown_levels(crown, flat.occupancy.shape, flat.origin_mm, flat.cell_size_mm)
+    return flat.crowned(levels), report
 
 
-def _no_cell(pitch_mm: NDArray[np.float64], weighting: Weighting, floor: float) -> MeshError:
+def _cropped(
+    box: LatticeBox,
+    thickness_mm: float,
+    kept: NDArray[np.bool_],
+    share: NDArray[np.float64] | None,
+) -> PadMesh:
+    """The mesh of the cells that are kept, with a flat surface."""
+    window, first = _trim(kept)
+    hx, hy, hz = box.cell_mm
+    mesh = PadMesh.from_occupancy(
+        np.ascontiguousarray(kept[window]),
+        (hx, hy, hz),
+        (box.x[first[0]], box.y[first[1]], -thickness_mm),
+        None if share is None else share[window],
+    )
+    return _with_exact_faces(mesh, thickness_mm)
+
+
+def _no_cell(cell_mm: NDArray[np.float64], weighting: Weighting, floor: float) -> MeshError:
     """The error of a lattice without a cell in the outline."""
     by_centre = weighting == "cell_centre"
     lacking = "has its centre" if by_centre else f"is filled by {floor:g} or more"
     return MeshError(
-        f"no cell of the {pitch_mm[0]:g} x {pitch_mm[1]:g} mm lattice {lacking} inside the "
+        f"no cell of the {cell_mm[0]:g} x {cell_mm[1]:g} mm lattice {lacking} inside the "
         "outline: use a finer pitch",
         field="pitch_mm",
-        value=(float(pitch_mm[0]), float(pitch_mm[1])),
+        value=(float(cell_mm[0]), float(cell_mm[1])),
     )
-
-
-def _lattice_pitch(
-    extent_mm: NDArray[np.float64],
-    cells: tuple[int, int, int] | None,
-    pitch_mm: float | tuple[float, float] | None,
-    layers: int,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
-    """Cell size (hx, hy), cells along the sides of the bounding box, and layers."""
-    if (cells is None) == (pitch_mm is None):
-        raise MeshError("give exactly one of cells=(nx, ny, nz) and pitch_mm", field="cells")
-    if cells is not None:
-        if len(cells) != 3 or any(int(c) != c or c < 1 for c in cells):
-            raise MeshError(f"cells = {cells}: must be three whole numbers >= 1", field="cells")
-        across = np.array(cells[:2], dtype=np.int64)
-        return extent_mm / across, across, int(cells[2])
-    if int(layers) != layers or layers < 1:
-        raise MeshError(f"layers = {layers!r}: must be a whole number >= 1", field="layers")
-    pitch = np.broadcast_to(np.asarray(pitch_mm, dtype=float), (2,)).copy()
-    if not np.isfinite(pitch).all() or (pitch <= 0.0).any():
-        raise MeshError(f"pitch_mm = {pitch_mm!r}: must be finite and > 0", field="pitch_mm")
-    # Checked before the cast: a tiny pitch would overflow the count.
-    _check_count(extent_mm / pitch, int(layers))
-    return pitch, np.maximum(np.rint(extent_mm / pitch), 1).astype(np.int64), int(layers)
-
-
-def _check_count(across: NDArray[Any], layers: int) -> None:
-    total = float(across[0]) * float(across[1]) * layers
-    if total > _MAX_CELLS:
-        raise MeshError(
-            f"the lattice would have {total:.3g} cells, the limit is {_MAX_CELLS}: "
-            "use a coarser pitch or fewer layers",
-            field="pitch_mm",
-            value=total,
-        )
 
 
 def _trim(
