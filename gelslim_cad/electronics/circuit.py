@@ -23,6 +23,7 @@ from gelslim_cad.electronics.strings import (
 from gelslim_cad.geometry.led_strips import Side, has_tip_light
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.names import Name
+from gelslim_cad.spec.led_library import LedVariant
 
 DRIVER_DROPOUT_V = 1.0
 """Voltage that a constant-current driver keeps for itself, as usual linear ones do."""
@@ -182,47 +183,35 @@ def circuit(
         The circuit.
     """
     variant = led.variant
-    least_v, typical_v, greatest_v = variant.forward_v
-    high_v = variant.voltage_v(wanted_ma, greatest_v, ambient_c)
-    volts = variant.voltage_v(wanted_ma, typical_v, ambient_c)
+    least_v, typical_v, _ = variant.forward_v
     if driven:
-        series, strings = count, np.ones_like(np.asarray(count, dtype=float))
-        ohm = 0.0 * strings
-        current = least = wanted_ma + 0.0 * strings
-        greatest = current
-        needed = series * high_v + DRIVER_DROPOUT_V
+        chosen = _one_string(variant, count, wanted_ma, ambient_c)
     else:
-        series = leds_in_series(supply_v, volts, high_v, count)
-        strings = np.ceil(count / series)
-        wanted_ohm = 1000 * (supply_v - series * volts) / wanted_ma
-        ohm = next_e24_ohm(np.maximum(wanted_ohm, LEAST_OHM))
-        current = string_current_ma(supply_v, series, ohm, variant, typical_v, ambient_c)
-        high = ohm * (1 + RESISTOR_TOLERANCE)
-        least = string_current_ma(supply_v, series, high, variant, greatest_v, ambient_c)
-        needed = series * high_v
+        chosen = _resistor_strings(variant, count, wanted_ma, supply_v, ambient_c)
+    current, greatest = chosen.current_ma, chosen.current_ma
     forward = variant.voltage_v(current, typical_v, ambient_c)
     flux = led.flux_at_mw(current)
-    supply_ma = strings * current
+    supply_ma = chosen.strings * current
     electrical_mw = count * forward * current if driven else supply_v * supply_ma
     heat = electrical_mw - count * flux
     board_c = ambient_c + board_k * heat / 1000
     junction_c = board_c + variant.thermal_k_per_w * (forward * current - flux) / 1000
     if not driven:
-        low = ohm * (1 - RESISTOR_TOLERANCE)
-        greatest = string_current_ma(supply_v, series, low, variant, least_v, junction_c)
-    resistor_mw = ohm * greatest**2 / 1000
+        low_ohm = chosen.ohm * (1 - RESISTOR_TOLERANCE)
+        greatest = string_current_ma(supply_v, chosen.series, low_ohm, variant, least_v, junction_c)
+    resistor_mw = chosen.ohm * greatest**2 / 1000
     return Circuit(
         led=led,
         count=count,
         wanted_ma=wanted_ma,
-        series=series,
-        strings=strings,
-        resistance_ohm=ohm,
+        series=chosen.series,
+        strings=chosen.strings,
+        resistance_ohm=chosen.ohm,
         current_ma=current,
-        least_ma=least,
+        least_ma=chosen.least_ma,
         greatest_ma=greatest,
         forward_v=forward,
-        needed_v=needed,
+        needed_v=chosen.needed_v,
         supply_ma=supply_ma,
         resistor_mw=resistor_mw,
         resistor=resistor_index(resistor_mw, board_c),
@@ -231,6 +220,42 @@ def circuit(
         board_c=board_c,
         junction_c=junction_c,
     )
+
+
+@dataclass(frozen=True)
+class _Strings:
+    """Strings of LEDs in series, with a resistor each or a driver, and their current."""
+
+    series: Any
+    strings: Any
+    ohm: Any
+    current_ma: Any
+    least_ma: Any
+    needed_v: Any
+
+
+def _one_string(variant: LedVariant, count: Any, wanted_ma: Any, ambient_c: Any) -> _Strings:
+    """All LEDs in series at a driver, which keeps the current that is wanted."""
+    strings = np.ones_like(np.asarray(count, dtype=float))
+    current = wanted_ma + 0.0 * strings
+    needed = count * variant.voltage_v(wanted_ma, variant.forward_v[2], ambient_c)
+    return _Strings(count, strings, 0.0 * strings, current, current, needed + DRIVER_DROPOUT_V)
+
+
+def _resistor_strings(
+    variant: LedVariant, count: Any, wanted_ma: Any, supply_v: Any, ambient_c: Any
+) -> _Strings:
+    """As many LEDs in series as the supply can feed, and the resistor next above the one wanted."""
+    _, typical_v, greatest_v = variant.forward_v
+    high_v = variant.voltage_v(wanted_ma, greatest_v, ambient_c)
+    volts = variant.voltage_v(wanted_ma, typical_v, ambient_c)
+    series = leds_in_series(supply_v, volts, high_v, count)
+    wanted_ohm = 1000 * (supply_v - series * volts) / wanted_ma
+    ohm = next_e24_ohm(np.maximum(wanted_ohm, LEAST_OHM))
+    current = string_current_ma(supply_v, series, ohm, variant, typical_v, ambient_c)
+    high = ohm * (1 + RESISTOR_TOLERANCE)
+    least = string_current_ma(supply_v, series, high, variant, greatest_v, ambient_c)
+    return _Strings(series, np.ceil(count / series), ohm, current, least, series * high_v)
 
 
 def string_resistors_ohm(found: Circuit, supply_v: float, lengths: tuple[int, ...]) -> list[float]:
