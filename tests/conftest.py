@@ -1,8 +1,9 @@
-"""The collector of cycles passes over what was collected, and comes seldom."""
+"""How the tests run: seldom a collection of cycles, and Ctrl-C as at a terminal."""
 
 from __future__ import annotations
 
 import gc
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -25,3 +26,9 @@ def pytest_collection() -> Iterator[None]:
         gc.enable()
         gc.freeze()
         gc.set_threshold(MOST_NEW_OBJECTS, *gc.get_threshold()[1:])
+
+
+def pytest_configure() -> None:
+    """Shells start a job in the background with SIGINT ignored, and every child inherits that."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
