@@ -225,10 +225,11 @@ class ContactSolver:
         depth = -float(np.min(below, initial=0.0))
         moved, guess = first.displacement_mm, first.force_n
         wanted = np.zeros(len(moved), dtype=bool)
-        if self._is_short(last, ahead):
+        stuck = last.touch == STICK
+        if self._is_short(targets.dragged_mm[stuck]):
             wanted = last.touch > 0
             if first is last:
-                moved = np.where((last.touch == STICK)[:, None], ahead, moved)
+                moved = moved + np.where(stuck[:, None], targets.dragged_mm, 0.0)
         for _ in range(GROWTH_STEPS):
             surface, room = self._room(pose, moved, offset, on_tool)
             deepest = -float(np.min(room, initial=0.0))
@@ -252,13 +253,13 @@ class ContactSolver:
             moved, guess = state.displacement_mm, state.force_n
         raise ContactError("the contact region keeps growing: take smaller steps of the motion")
 
-    def _is_short(self, last: GelState, ahead_mm: Array) -> bool:
-        """Whether the tool moves little on what it holds.
+    def _is_short(self, dragged_mm: Array) -> bool:
+        """Whether the tool drags what it holds a short way (n, 3).
 
         A step then starts with what sticks carried along, in contact as before. Over a longer way
         a rim that passes a node would be found to hold it.
         """
-        way = np.linalg.norm((ahead_mm - last.displacement_mm)[last.touch == STICK], axis=1)
+        way = np.linalg.norm(dragged_mm, axis=1)
         pitch_mm = min(self.compliance.bundle.mesh.cell_size_mm[:2])
         return float(way.max(initial=0.0)) < CARRIED * pitch_mm
 
