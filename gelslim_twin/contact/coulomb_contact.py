@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, lu_factor, lu_solve
 
 from gelslim_twin.contact.contact_forces import SLIP, ContactForces
-from gelslim_twin.contact.coulomb_kernel import answers, motion, sweeps
+from gelslim_twin.contact.coulomb_kernel import answers, motion, own_compliance, sweeps
 from gelslim_twin.contact.gel_state import ContactError
 
 Array = NDArray[np.float64]
@@ -41,12 +41,14 @@ class FrictionalContact:
     ) -> None:
         n = len(height)
         self.c = np.ascontiguousarray(compliance)
-        self.frames = np.tile(np.eye(3), (n, 1, 1)) if frames is None else np.array(frames)
-        blocks = self.c.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n), :].astype(float)
-        self.own = np.ascontiguousarray(self.frames.transpose(0, 2, 1) @ blocks @ self.frames)
+        self.frames = np.zeros((n, 3, 3)) if frames is None else np.array(frames)
+        if frames is None:
+            self.frames.reshape(n, 9)[:, ::4] = 1.0
+        self.own = np.empty((n, 3, 3))
+        own_compliance(self.c, self.frames, self.own)
         self.height = np.ascontiguousarray(height, dtype=float)
         self.target = np.ascontiguousarray(target, dtype=float)
-        self.mu = np.array(np.broadcast_to(friction, len(height)), dtype=float)
+        self.mu = np.full(n, friction, dtype=float)
         self.touch = np.zeros(len(height), dtype=np.int8)
 
     def balance(self, start: Array, start_mm: Array | None, tolerance: float) -> ContactForces:

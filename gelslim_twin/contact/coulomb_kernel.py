@@ -79,6 +79,23 @@ def node_force(w: Any, rx: float, ry: float, rz: float, friction: float) -> Any:
 
 
 @njit(cache=True)
+def own_compliance(compliance: Any, frames: Any, own: Any) -> None:
+    """own (n, 3, 3): the compliance of each node in its frame, of compliance (3n, 3n).
+
+    frames (n, 3, 3) have the axes of a node in their columns.
+    """
+    for k in range(len(own)):
+        q = frames[k]
+        for p in range(3):
+            for r in range(3):
+                total = 0.0
+                for a in range(3):
+                    for b in range(3):
+                        total += q[a, p] * compliance[3 * k + a, 3 * k + b] * q[b, r]
+                own[k, p, r] = total
+
+
+@njit(cache=True)
 def _wanted(
     k: int, own: Any, frames: Any, height: Any, target: Any, friction: Any, f: Any, u: Any
 ) -> Any:

@@ -149,8 +149,11 @@ class PlaneIteration:
         if self.correction is not None:
             offset = self.correction.first_mm(force_n)
         sweeps, worst = 0, np.inf
-        # Planes of a flat tool do not turn, so that loose forces would only be solved again.
-        inner_tolerance = FINER * fine if self._is_flat(surface) else max(fine, LOOSE)
+        flat = self._is_flat(surface)
+        # Planes of a flat tool do not turn, so that loose forces would only be solved again. A node
+        # beside the tool may come under it, after which they are solved again anyway.
+        once = flat and bool(surface.is_met[self.wanted].all())
+        inner_tolerance = FINER * fine if once else max(fine, LOOSE)
         for turn in range(GEOMETRY_STEPS):
             balance = self._balance(shape, u, offset, force, inner_tolerance, known)
             sweeps += balance.sweeps
@@ -174,6 +177,8 @@ class PlaneIteration:
             # Where the gap decreases slowly, the inexact forces are the cause.
             finer = inner_tolerance * (FINER if worst > FINER * before else 1.0)
             inner_tolerance = max(fine, min(finer, AHEAD * worst / self.deepest_mm))
+            if flat and turn == 0:
+                inner_tolerance = min(inner_tolerance, FINER * fine)
             u_before, u = u, new
             if turn >= DAMPED_FROM:
                 # Damping, because a node at an edge jumps from one flank to the other and back.
@@ -241,4 +246,5 @@ def allowed_motion_mm(surface: ToolSurface, points_mm: Array, moved_mm: Array) -
 
     `points_mm` (n, 3) are the nodes after the displacement `moved_mm` (n, 3).
     """
-    return np.asarray(surface.gap_mm(points_mm) + (surface.normal * moved_mm).sum(axis=1))
+    along = np.einsum("ia,ia->i", surface.normal, moved_mm)
+    return np.asarray(surface.gap_mm(points_mm) + along)

@@ -100,6 +100,9 @@ class StepMechanics:
         mesh = self.compliance.bundle.mesh
         self.thickness_mm = mesh.layers * mesh.cell_size_mm[2]
         self._cell_mm2 = mesh.cell_size_mm[0] * mesh.cell_size_mm[1]
+        length, width, _ = np.ptp(self.points_mm, axis=0)
+        self._pad_mm = float(length), float(width)
+        self.top_mm = float(self.points_mm[:, 2].max())
 
     @property
     def points_mm(self) -> Array:
@@ -155,8 +158,7 @@ class StepMechanics:
         if contact is None:
             return self.rest
         self.require_shallow(placement.name, contact.depth_mm)
-        low, high = self.points_mm.min(axis=0), self.points_mm.max(axis=0)
-        placement.require_no_undercut((high[0] - low[0], high[1] - low[1]), high[2])
+        placement.require_no_undercut(self._pad_mm, self.top_mm)
         large_strain = self.needs_large_strain(contact)
         large_strain &= placement.layer is None
         solver = self._nonlinear.solver if large_strain else self._solver_with(placement.layer)

@@ -307,7 +307,7 @@ class Twin:
 
     @property
     def _top_mm(self) -> float:
-        return float(self.points_mm[:, 2].max())
+        return self._shared.mechanics.top_mm
 
     def _initial(self) -> TwinState:
         compliance = self._shared.mechanics.compliance

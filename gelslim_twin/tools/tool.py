@@ -17,6 +17,7 @@ from gelslim_twin.tools.tool_kernel import (
     DIFFERENCE_MM,
     MOST_SLOPE,
     ROUNDING_MM,
+    gaps_to_planes,
     node_frames,
     own_coordinates,
     paths_to_walls,
@@ -158,7 +159,9 @@ class ToolSurface:
 
     def gap_mm(self, points_mm: Array) -> Array:
         """Gap (n,) between points (n, 3) and planes along the normals; negative for penetration."""
-        return np.asarray(((self.met_mm - points_mm) * self.normal).sum(axis=1))
+        gap = np.empty(len(points_mm))
+        gaps_to_planes(self.met_mm, self.normal, points_mm, gap)
+        return gap
 
     @property
     def frames(self) -> Array | None:

@@ -108,6 +108,17 @@ def paths_to_walls(
 
 
 @njit(cache=True)
+def gaps_to_planes(met: Any, normal: Any, points: Any, gap: Any) -> None:
+    """gap (n,) between points (n, 3) and planes through `met` (n, 3), along their normals (n, 3)."""
+    for i in range(len(gap)):
+        gap[i] = (
+            (met[i, 0] - points[i, 0]) * normal[i, 0]
+            + (met[i, 1] - points[i, 1]) * normal[i, 1]
+            + (met[i, 2] - points[i, 2]) * normal[i, 2]
+        )
+
+
+@njit(cache=True)
 def node_frames(normal: Any, frames: Any) -> None:
     """frames (n, 3, 3): in the columns two tangents and the unit normal (n, 3).
 
