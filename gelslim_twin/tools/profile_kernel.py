@@ -40,4 +40,5 @@ def convex_heights(normals: Any, reach: Any, margin_mm: float, x: Any, y: Any, h
                 high = min(high, room / normals[k, 2])
             elif room < -margin_mm:
                 inside = False
+                break
         height[i] = low if inside and low <= high + margin_mm else np.inf

@@ -17,6 +17,7 @@ from gelslim_twin.tools.tool_kernel import (
     DIFFERENCE_MM,
     MOST_SLOPE,
     ROUNDING_MM,
+    carried_points,
     gaps_to_planes,
     node_frames,
     own_coordinates,
@@ -47,7 +48,10 @@ class Tool:
 
     def local(self, x: Array, y: Array) -> Array:
         """Height (n,) of the lower surface in the tool's frame; infinite outside its outline."""
-        heights = [shape(x - dx, y - dy) + raised for shape, (dx, dy), raised in self.shapes]
+        heights = [
+            shape(x - dx, y - dy) + raised if dx or dy or raised else shape(x, y)
+            for shape, (dx, dy), raised in self.shapes
+        ]
         return heights[0] if len(heights) == 1 else np.asarray(np.min(heights, axis=0))
 
     def clearance_mm(self, pose: Pose, points_mm: Array) -> Array:
@@ -111,8 +115,9 @@ class Tool:
         """Positions at another pose of points (n, 3) that are fixed to the tool."""
         start = np.array([before.x_mm, before.y_mm, -before.depth_mm])
         end = np.array([after.x_mm, after.y_mm, -after.depth_mm])
-        turn = rotation(after) @ rotation(before).T
-        return np.asarray((points_mm - start) @ turn.T + end)
+        moved = np.empty(points_mm.shape)
+        carried_points(points_mm, start, rotation(after) @ rotation(before).T, end, moved)
+        return moved
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,6 +29,15 @@ def own_coordinates(points: Any, origin: Any, turn: Any, own: Any) -> None:
 
 
 @njit(cache=True)
+def carried_points(points: Any, start: Any, turn: Any, end: Any, moved: Any) -> None:
+    """moved (n, 3) = points (n, 3) turned by turn (3, 3) about `start`, which goes to `end`."""
+    for i in range(len(points)):
+        x, y, z = points[i, 0] - start[0], points[i, 1] - start[1], points[i, 2] - start[2]
+        for a in range(3):
+            moved[i, a] = turn[a, 0] * x + turn[a, 1] * y + turn[a, 2] * z + end[a]
+
+
+@njit(cache=True)
 def central_slope(behind: float, here: float, ahead: float) -> float:
     """Slope by the central difference; at a rim the one-sided difference within the tool."""
     up, down = (ahead - here) / DIFFERENCE_MM, (here - behind) / DIFFERENCE_MM
@@ -109,7 +118,7 @@ def paths_to_walls(
 
 @njit(cache=True)
 def gaps_to_planes(met: Any, normal: Any, points: Any, gap: Any) -> None:
-    """gap (n,) between points (n, 3) and planes through `met` (n, 3), along their normals (n, 3)."""
+    """gap (n,) between points (n, 3) and planes through `met`, along their normals (both (n, 3))."""
     for i in range(len(gap)):
         gap[i] = (
             (met[i, 0] - points[i, 0]) * normal[i, 0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 TILE = 16
@@ -39,10 +40,25 @@ def add_motion(rows: Any, nodes: Any, force: Any, starts: Any, ends: Any, motion
 
     Nodes without force cost nothing.
     """
+    pushed, count = np.empty(len(nodes), dtype=np.intp), 0
     for i in range(len(nodes)):
+        if force[i, 0] != 0.0 or force[i, 1] != 0.0 or force[i, 2] != 0.0:
+            pushed[count] = i
+            count += 1
+    # Two nodes at once, so that the motion is read and written half as often.
+    for pair in range(0, count - 1, 2):
+        i, j = pushed[pair], pushed[pair + 1]
         x, y, z = force[i, 0], force[i, 1], force[i, 2]
-        if x == 0.0 and y == 0.0 and z == 0.0:
-            continue
+        p, q, r = force[j, 0], force[j, 1], force[j, 2]
+        row, next_row = rows[nodes[i]], rows[nodes[j]]
+        for run in range(len(starts)):
+            for k in range(starts[run], ends[run]):
+                motion[k] += (x * row[0, k] + y * row[1, k] + z * row[2, k]) + (
+                    p * next_row[0, k] + q * next_row[1, k] + r * next_row[2, k]
+                )
+    if count % 2:
+        i = pushed[count - 1]
+        x, y, z = force[i, 0], force[i, 1], force[i, 2]
         row = rows[nodes[i]]
         for run in range(len(starts)):
             for k in range(starts[run], ends[run]):

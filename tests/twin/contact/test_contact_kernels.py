@@ -14,6 +14,7 @@ from gelslim_twin.contact.coulomb_kernel import (
     answers,
     motion,
     node_force,
+    own_compliance,
     sweep,
     sweeps,
 )
@@ -55,6 +56,19 @@ def test_a_nodes_force_obeys_coulombs_law_to_rounding() -> None:
         assert abs(off[0] * fy - off[1] * fx) < 1e-10 * size * side
         assert off[0] * fx + off[1] * fy <= 0
     assert min(kinds.values()) > 100
+
+
+def test_the_compliance_of_a_node_in_its_frame() -> None:
+    rng = np.random.default_rng(4)
+    root = rng.standard_normal((3 * NODES, 3 * NODES))
+    c = (root @ root.T).astype(np.float32)
+    frames = Rotation.random(NODES, random_state=4).as_matrix()
+    own = np.empty((NODES, 3, 3))
+    own_compliance(c, frames, own)
+    for k in range(NODES):
+        node = slice(3 * k, 3 * k + 3)
+        known = frames[k].T @ c[node, node].astype(float) @ frames[k]
+        np.testing.assert_allclose(own[k], known, atol=1e-12)
 
 
 def test_a_node_without_friction_is_pressed_along_its_normal_only() -> None:

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from gelslim_twin.tools.profile_kernel import arc_heights, convex_heights
-from gelslim_twin.tools.tool_kernel import MOST_SLOPE, central_slope, node_frames
+from gelslim_twin.tools.tool_kernel import (
+    MOST_SLOPE,
+    carried_points,
+    central_slope,
+    gaps_to_planes,
+    node_frames,
+)
 
 
 def test_a_slope_at_a_rim_and_at_a_wall() -> None:
@@ -23,6 +29,19 @@ def test_a_slope_at_a_rim_and_at_a_wall() -> None:
     )
     for heights, slope in cases:
         assert central_slope(*heights) == pytest.approx(slope, abs=1e-9)
+
+
+def test_points_carried_by_a_motion_and_their_gaps_to_planes() -> None:
+    rng = np.random.default_rng(6)
+    points, met, normal = rng.normal(size=(3, 30, 3))
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    start, end = rng.normal(size=(2, 3))
+    moved, gap = np.empty((30, 3)), np.empty(30)
+    carried_points(points, start, turn, end, moved)
+    np.testing.assert_allclose(moved, (points - start) @ turn.T + end, atol=1e-14)
+    met[3, 2], normal[3, 2] = np.inf, 1.0
+    gaps_to_planes(met, normal, points, gap)
+    np.testing.assert_allclose(gap, ((met - points) * normal).sum(axis=1), atol=1e-14)
 
 
 def test_frames_are_rotations_with_the_normal_last() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from contact_pads import YOUNGS_MPA, dense_compliance, small_pad
 from scipy.spatial.transform import Rotation
 from stepping_rig import DT_S, Array, at, linear_twin, pad_folder
 
+from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.step import Step
 
@@ -197,3 +199,27 @@ def test_a_body_that_sticks_to_the_gel_keeps_its_energy(pad: Path) -> None:
     first, last = np.ptp(path[:500], axis=0), np.ptp(path[-500:], axis=0)
     assert (first > 0.01).all()
     np.testing.assert_allclose(last, first, rtol=0.06)
+
+
+def test_what_a_rim_has_pressed_down_is_solved_once(
+    pad: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nodes that a rim met with its whole depth must not count as carried over a long way."""
+    rounds = 0
+    solved_round = ContactSolver._state
+
+    def counted(self: ContactSolver, *given: Any) -> Any:
+        nonlocal rounds
+        rounds += 1
+        return solved_round(self, *given)
+
+    monkeypatch.setattr(ContactSolver, "_state", counted)
+    twin = linear_twin(pad, "1%", friction=0.6)
+    twin.add(Body.box(4.0, 4.0, 4.0))
+    for depth_mm in (0.1, 0.2, 0.3, 0.4):
+        twin.step(at(0.0, 0.0, 2.0 - depth_mm), DT_S)
+    rounds, steps = 0, 60
+    for way_mm in np.linspace(0.02, 1.2, steps):
+        step = twin.step(at(float(way_mm), 0.0, 1.6), DT_S)
+        assert_balanced(step)
+    assert rounds <= 1.2 * steps
