@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 from gelslim_twin.effects.contact_estimate import Footprint
@@ -52,14 +53,18 @@ def tool_footprint(
         below = [one for one in indenters if depth > one.raised_mm]
         return max((value(one, depth - one.raised_mm) for one in below), default=0.0)
 
+    # A planner asks for them at the same few depths again and again.
+    kept = lru_cache(maxsize=32)
     return Footprint(
-        lambda d: total(d)[0],
-        lambda d: total(d)[1],
-        lambda d: largest(
-            lambda one, own: math.hypot(one.x_mm, one.y_mm) + _reach_mm(one, folder, own), d
+        kept(lambda d: total(d)[0]),
+        kept(lambda d: total(d)[1]),
+        kept(
+            lambda d: largest(
+                lambda one, own: math.hypot(one.x_mm, one.y_mm) + _reach_mm(one, folder, own), d
+            )
         ),
-        lambda d: largest(_steepest, d),
-        lambda d: min((w for _, _, w in parts(d)), default=0.0),
+        kept(lambda d: largest(_steepest, d)),
+        kept(lambda d: min((w for _, _, w in parts(d)), default=0.0)),
     )
 
 
