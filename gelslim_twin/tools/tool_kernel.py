@@ -118,7 +118,7 @@ def paths_to_walls(
 
 @njit(cache=True)
 def gaps_to_planes(met: Any, normal: Any, points: Any, gap: Any) -> None:
-    """gap (n,) between points (n, 3) and planes through `met`, along their normals (both (n, 3))."""
+    """gap (n,) of points (n, 3) to planes through `met` (n, 3) along their normals (n, 3)."""
     for i in range(len(gap)):
         gap[i] = (
             (met[i, 0] - points[i, 0]) * normal[i, 0]

@@ -69,7 +69,7 @@ def occupancy_table(element_matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=4)
 def _tabulated(element_matrix: bytes) -> NDArray[np.float64]:
-    """The table of the bytes of an element matrix, which operators of one pad ask for repeatedly."""
+    """The table of an element matrix, for which the operators of a pad ask again and again."""
     blocks = np.frombuffer(element_matrix).reshape(8, 3, 8, 3).transpose(0, 2, 1, 3)
     bits = (np.arange(256)[:, None] >> np.arange(8) & 1).astype(float)
     table = np.zeros((256, 27, 3, 3))
