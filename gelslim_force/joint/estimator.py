@@ -222,9 +222,15 @@ class JointEstimator:
         )
 
     def excess(self, state: FitState) -> Excess:
-        """What the gel moves further than a linear one in an estimate, after one more step."""
+        """What the gel moves further than a linear one in an estimate, after one more step.
+
+        The frame before hands on what it found: a step for its forces would come too late, as the
+        first solution of the next frame has others.
+        """
         if self.strained is None or state.depth_mm <= self.strained.from_mm:
             return Excess(np.zeros_like(state.force_n))
+        if state.equations is None and state.motion.excess.pad is not None:
+            return state.motion.excess
         return self.strained.excess(state.displacement_mm, state.force_n, state.motion.excess)
 
     def marker_rows(self, frame: FrameData, near: Mask, moved_mm: Array) -> MarkerRows:

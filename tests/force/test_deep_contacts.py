@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from camera_rig import off_centre_view
 from deep_contacts import COUNT, KINDS, SEEN, deep_case, deep_contact, finer_pad, solve
-from deep_gate import deep_scores
+from deep_gate import after_a_weaker_contact, deep_scores
 from deep_pictures import Light
 from frame_errors import error_summary
 from numpy.typing import NDArray
@@ -91,6 +91,15 @@ def test_forces_at_large_strain(
     for summary in summaries(s.score for s in some):
         assert 0.5 < summary.rms < (1.3 if law == "linear" else 1.2)
         assert summary.covered > 0.9
+
+
+@pytest.mark.slow
+def test_a_frame_after_a_weaker_contact_has_the_forces_of_one_alone() -> None:
+    """What the frame before hands on, forces and the excess of the gel, is a start and no more."""
+    apart = np.array([after_a_weaker_contact(seed) for seed in range(0, COUNT, 7)])
+    assert len(apart) > 8
+    assert np.median(apart) < 0.25
+    assert apart.max() < 1.5
 
 
 @pytest.mark.slow
