@@ -31,10 +31,12 @@ Estimate = tuple[Mask, FitState]
 _SETTLED, _FAR, _LOST = 0.01, 0.2, 0.03
 """Shares of the force. A change below the first one ends the linearisations. One more is needed for
 a change above the second one since the last frame, and if nodes with the third one are left out."""
-_HELD_SLOPE = 0.07
-"""Change of the surface, over the spacing of the nodes, up to which linear data hold. Forces of 64
-random contacts then differ from those of another linearisation by 0.03 standard deviations in the
-median, and the root mean square of their errors against the truth by 2 % at most."""
+_HELD_SLOPE, _HELD_BETWEEN = 0.07, 0.19
+"""Changes of the surface, over the spacing of the nodes, up to which linear data hold: for contacts
+that are not deep, and for forces that another linearisation follows. Forces of 64 random contacts
+then differ from those of another linearisation by 0.03 standard deviations in the median, and the
+root mean square of their errors against the truth by 2 % at most. Those of deep contacts that move
+are as near to converged linearisations as with one more."""
 
 
 def finished(steps: Steps[Found]) -> Found:
@@ -91,7 +93,9 @@ def _last_rounds(estimator: JointEstimator, frame: FrameData, begun: Estimate) -
         nodes, state = yield from _rounds(estimator, frame, (nodes, state), rounds[1:])
     elif deep and state.share_beside(nodes) > _LOST:
         yield
-        state = estimator.solution(frame, np.flatnonzero(nodes), state)
+        some = np.flatnonzero(nodes)
+        held = _held(estimator, state, some, _HELD_BETWEEN)
+        state = estimator.solution(frame, some, state) if held is None else held
     if too_deep:
         return nodes, state
     yield
@@ -108,7 +112,9 @@ def _rounds(
         if number > 0:
             wider = state.force_n
             nodes = estimator.pressing(nodes, state)
-            held = _held(estimator, state, np.flatnonzero(nodes))
+            held = None
+            if not estimator.deepness(state) > 0:
+                held = _held(estimator, state, np.flatnonzero(nodes), _HELD_SLOPE)
             if held is not None:
                 state, count = held, count - 1
         for _ in range(count):
@@ -118,17 +124,19 @@ def _rounds(
     return nodes, replace(state, wider_n=wider)
 
 
-def _held(estimator: JointEstimator, state: FitState, nodes: Nodes) -> FitState | None:
+def _held(
+    estimator: JointEstimator, state: FitState, nodes: Nodes, most_slope: float
+) -> FitState | None:
     """The forces on fewer nodes by the linear data of the last round.
 
-    None where the gel moves so far that these do not hold, and for deep contacts.
+    None where the gel moves so far, by its slope, that these do not hold.
     """
-    if state.data is None or estimator.deepness(state) > 0:
+    if state.data is None:
         return None
     data = state.data.on(nodes)
     found = estimator.solved(data)
     slope = np.abs(found.displacement_mm - data.moved_mm).max() / estimator.lattice.step_mm.min()
-    if slope > _HELD_SLOPE:
+    if slope > most_slope:
         return None
     # As in every round, residuals are those of the forces before it.
     return replace(found, markers=data.markers.after(state.force_n[nodes].ravel() - data.start))

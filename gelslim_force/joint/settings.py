@@ -65,7 +65,8 @@ class JointSettings:
             linearisation of its own, except for the first on fewer nodes of a contact that is not
             deep, where the linear data of the last one still hold.
         following_rounds: The same on the nodes that pressed before and those next to them: after
-            `rounds`, or instead of them where the frame before had this contact.
+            `rounds`, or instead of them where the frame before had this contact. Deep contacts keep
+            the linear data too where the forces are not the last ones.
         deep_rounds: Most further linearisations of a deep contact, until the force changes by less
             than a hundredth.
         finer_pressure: With light, the last linearisation is with normal forces at half the pitch
