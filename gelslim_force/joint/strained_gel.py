@@ -55,7 +55,7 @@ class StrainedGel:
     def of(cls, bundle: Bundle, from_mm: float) -> StrainedGel:
         """The law of a bundle. Raises MeshError for a pad whose layers differ."""
         system = PadSystem(bundle.mesh, np.asarray(bundle.element_matrix), bundle.membranes)
-        return cls(FiniteStrainForce.per_frame(bundle), system.infinite_compliance, from_mm)
+        return cls(FiniteStrainForce.per_frame(bundle), system.mirrored_compliance, from_mm)
 
     def excess(self, moved_mm: Array, force_n: Array, known: Excess) -> Excess:
         """One step of the excess.

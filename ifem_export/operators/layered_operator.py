@@ -137,16 +137,17 @@ def inverse(blocks: AnyBlocks) -> AnyBlocks:
     return np.asarray((found + found.conj().swapaxes(-1, -2)) / 2)
 
 
-def surface_stiffness(blocks: Blocks) -> Blocks:
+def surface_stiffness(blocks: AnyBlocks) -> AnyBlocks:
     """Blocks (ky, kx, 3, 3) of the surface alone: S = K_ss - K_si K_ii⁻¹ K_is."""
-    inner, top = blocks[..., :-3, :-3], blocks[..., -3:, -3:]
+    whole: Any = blocks
+    inner, top = whole[..., :-3, :-3], whole[..., -3:, -3:]
     if inner.shape[-1] == 0:
-        return top
-    coupling = blocks[..., :-3, -3:]
+        return np.asarray(top)
+    coupling = whole[..., :-3, -3:]
     return np.asarray(top - coupling.conj().swapaxes(-1, -2) @ np.linalg.solve(inner, coupling))
 
 
-def surface_compliance(blocks: Blocks) -> Blocks:
+def surface_compliance(blocks: AnyBlocks) -> AnyBlocks:
     """Blocks (ky, kx, 3, 3) of surface displacement per surface force."""
     return inverse(surface_stiffness(blocks))
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -27,6 +28,9 @@ from ifem_export.operators.layered_operator import even_fast_length, stiffness_s
 Array = NDArray[np.float64]
 MIRRORED = 1e-9
 """Largest difference of an element from its mirror image over its largest entry: rounding."""
+MOST_BY_MATRICES = 64
+"""Places along a lattice up to which products with matrices take less time than transforms."""
+_TOGETHER = 4  # wave numbers, as many as a vector unit takes
 
 
 class Preconditioner(Protocol):
@@ -56,6 +60,16 @@ class MirroredOperator:
 
     def __call__(self, field: Array) -> Array:
         """Apply to a field (L, c, 3); the result has the same shape."""
+        if max(self.shape) > MOST_BY_MATRICES:
+            return self.by_transforms(field)
+        from ifem_export.operators.wave_kernel import convolve
+
+        found = np.empty(field.shape)
+        convolve(np.ascontiguousarray(field, dtype=float), self.columns, *self._matrices, found)
+        return found
+
+    def by_transforms(self, field: Array) -> Array:
+        """The same by fast Fourier transforms, for a lattice of any size."""
         from ifem_export.operators.mirrored_kernel import collect, multiply, spread
 
         lattice = np.empty((*self.shape, field.shape[0], 3))
@@ -66,6 +80,35 @@ class MirroredOperator:
         found = np.empty(field.shape)
         collect(result, self.columns, found)
         return found
+
+    @cached_property
+    def _matrices(self) -> tuple[Array, Array, Array, Array, Array]:
+        """Both pairs of matrices, and the blocks, as `wave_kernel.convolve` takes them."""
+        used = self.columns.max(axis=0) + 1
+        to_y, from_y = _cosines_and_sines(self.shape[0], int(used[0]), 1)
+        to_x, from_x = _cosines_and_sines(self.shape[1], int(used[1]), _TOGETHER)
+        blocks = np.zeros((*self.blocks.shape[:1], *self.blocks.shape[2:], len(to_x) // 2))
+        blocks[..., : self.blocks.shape[1]] = self.blocks.transpose(0, 2, 3, 1)
+        return to_y, np.ascontiguousarray(to_x.T), from_x, np.ascontiguousarray(from_y.T), blocks
+
+
+def _cosines_and_sines(length: int, used: int, together: int) -> tuple[Array, Array]:
+    """Matrices (2h, used) of the waves of a periodic lattice, and of their shares in a field.
+
+    Args:
+        length: Places of the lattice, an even number.
+        used: Places that have values.
+        together: h is a multiple of this; what is more than the waves is zero.
+    """
+    number = np.arange(length // 2 + 1)
+    angle = 2 * np.pi * np.outer(number, np.arange(used)) / length
+    waves = np.zeros((2, -(-len(number) // together) * together, used))
+    waves[:, : len(number)] = np.cos(angle), np.sin(angle)
+    # All but the mean and the alternating wave stand for two.
+    share = np.where(number % (length // 2) == 0, 1.0, 2.0) / length
+    back = waves.copy()
+    back[:, : len(number)] *= share[:, None]
+    return waves.reshape(-1, used), back.reshape(-1, used)
 
 
 def mirrored_operator(

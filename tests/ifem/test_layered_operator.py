@@ -111,6 +111,9 @@ def test_half_the_blocks_as_reals_are_the_whole_operator(
     size = expected.blocks.shape[-1] // 3
     found, whole = dense(made, size), dense(expected, size)
     assert found == pytest.approx(whole, abs=1e-13 * np.abs(whole).max())
+    field = np.random.default_rng(0).normal(size=(size, len(columns), 3))
+    by_transforms = made.by_transforms(field)
+    assert made(field) == pytest.approx(by_transforms, abs=1e-12 * np.abs(by_transforms).max())
     rows = expected.shape[0]
     assert made.blocks.nbytes / expected.blocks.nbytes == (rows // 2 + 1) / (2 * rows)
 

@@ -20,6 +20,7 @@ from ifem_export.errors import IfemError, MeshError
 from ifem_export.mesh.crown import Paraboloid
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.surface_operator import Rung
 
 Array = NDArray[np.float64]
@@ -158,6 +159,17 @@ def test_operators_contain_the_skin_of_a_bundle(rung: Rung, close: float) -> Non
     force = operator.force(motion)
     np.testing.assert_allclose(force, expected, atol=close * np.abs(own).max())
     np.testing.assert_allclose(operator.displacement(force), motion, atol=max(close, 1e-6) * 4)
+
+
+@pytest.mark.parametrize("membranes", [(), (COAT, FABRIC)])
+def test_the_mirrored_compliance_is_that_of_the_infinite_pad(
+    membranes: tuple[Membrane, ...],
+) -> None:
+    pad = small_pad(0.45, 9, 3, 8.0)
+    system = PadSystem(pad.mesh, np.asarray(pad.element_matrix), membranes)
+    force = np.random.default_rng(2).standard_normal((1, system.columns, 3))
+    found, expected = system.mirrored_compliance(force), system.infinite_compliance(force)
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_convolutions_contain_the_skin_within_the_pad() -> None:
