@@ -124,11 +124,14 @@ class NormalEquations:
 
         Only forces that are `free` (q,) vary.
         """
+        from gelslim_force.joint.kernels.fit_kernel import take_triangle
+
         found = np.zeros(sums.shape)
         if free.any():
             varied = np.flatnonzero(free)
-            block = np.ascontiguousarray(self.hessian[varied][:, varied])
-            # The transposed block, which is the same one, is in the order of LAPACK.
+            block = np.empty((len(varied), len(varied)))
+            take_triangle(self.hessian, varied, block)
+            # The upper triangle of the transposed block, in the order of LAPACK.
             factor = cho_factor(block.T, overwrite_a=True, check_finite=False)
             found[:, varied] = cho_solve(factor, sums[:, varied].T, check_finite=False).T
         return found

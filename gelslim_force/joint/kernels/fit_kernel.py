@@ -151,3 +151,12 @@ def take_nodes(rows: Any, nodes: Any, found: Any) -> None:
         for k in range(len(nodes)):
             for axis in range(3):
                 out[3 * k + axis] = row[3 * nodes[k] + axis]
+
+
+@njit(**COMPILED)
+def take_triangle(matrix: Any, which: Any, found: Any) -> None:
+    """Write rows and columns `which` (q,) of a matrix to the lower triangle of `found` (q, q)."""
+    for i in range(len(which)):
+        row, out = matrix[which[i]], found[i]
+        for j in range(i + 1):
+            out[j] = row[which[j]]

@@ -103,3 +103,33 @@ def widen_nodes(nodes: Any, place: Any, steps: Any, distance: Any, found: Any) -
     city_block(picture, False, distance)
     for n in range(len(nodes)):
         found[n] = distance[place[n, 0], place[n, 1]] <= steps
+
+
+@njit(**COMPILED)
+def fill_holes(picture: Any, found: Any) -> None:
+    """Write to `found` a picture with all false places that the edge does not reach made true.
+
+    Steps go along rows and columns.
+
+    Args:
+        picture: (rows, columns).
+        found: Receives (rows, columns).
+    """
+    rows, columns = picture.shape
+    found[:] = True
+    waiting, count = np.empty((rows * columns, 2), dtype=np.intp), 0
+    for i in range(rows):
+        step = 1 if i in (0, rows - 1) else max(columns - 1, 1)
+        for j in range(0, columns, step):
+            if not picture[i, j]:
+                found[i, j] = False
+                waiting[count, 0], waiting[count, 1] = i, j
+                count += 1
+    while count > 0:
+        count -= 1
+        i, j = waiting[count]
+        for a, b in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+            if 0 <= a < rows and 0 <= b < columns and found[a, b] and not picture[a, b]:
+                found[a, b] = False
+                waiting[count, 0], waiting[count, 1] = a, b
+                count += 1
