@@ -90,6 +90,11 @@ class PatchFinder:
         self._light = ShadingReference(picture, markers, self._radius, bin_px, opposed)
         self._bins = GelBins(self._light, camera, surface_mm)
 
+    @property
+    def searched(self) -> bool:
+        """Whether the last patch was searched for anew, which takes longer than to follow it."""
+        return self._last is not None and self._last.age == 0
+
     def change(
         self, image: NDArray[np.uint8], markers_px: ArrayLike | None = None
     ) -> ShadingChange:

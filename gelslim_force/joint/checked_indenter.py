@@ -33,6 +33,8 @@ _SOLUTIONS = 2
 """Of the unknown shape in each frame of a comparison that goes on over several, the look at the
 light being the first. A comparison ends in the frame after the one that it is of, or in the next
 but one."""
+_WAITS = 3
+"""Most frames in a row in which a comparison leaves the time to a search for the patch."""
 _GROWN = 0.1
 """Change of the patch's size from which it is compared before that."""
 _ANOTHER = (
@@ -103,8 +105,9 @@ class CheckedIndenter:
     """`NormalSource` of a named indenter that another one confirms.
 
     It compares the forces in the first frame of a contact, when the patch grows or shrinks, and
-    every ten frames; the verdict holds in between. What may be another contact is judged at once.
-    The work of the comparison every ten frames is spread over the frames after it, always alike.
+    every ten frames; the verdict holds in between. A new contact is judged at once. The work of the
+    other comparisons is spread over the frames after the one that they are of, and waits where the
+    patch is searched for anew. Neither depends on time.
 
     Attributes:
         named: The named indenter.
@@ -120,6 +123,7 @@ class CheckedIndenter:
         self.witness.reset()
         self._size_mm, self._age, self._verdict = 0.0, 0, _Verdict()
         self._running: _Comparison | None = None
+        self._waited = 0
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenIndenter | str | None:
         """The patch of a frame whose markers are at (n, 2), and what is compared with it.
@@ -132,20 +136,28 @@ class CheckedIndenter:
             return patch
         lost = bool(np.isnan(markers_px).any())
         shown = self.witness.estimator.shown(image, markers_px) if lost else None
-        changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
+        if self._size_mm == 0.0:
+            self._size_mm = patch.size_mm
+            return SeenIndenter(patch, self.witness.look(image, markers_px), True, shown)
+        seen = SeenIndenter(patch, None, False, shown)
         self._age += 1
         if self._running is not None and self._running.ended:
             self._running = None
-        if changed:
-            self._size_mm, self._age, self._running = patch.size_mm, 0, None
-            return SeenIndenter(patch, self.witness.look(image, markers_px), True, shown)
-        seen = SeenIndenter(patch, None, False, shown)
-        if self._age >= _FRAMES:
+        if self._gives_way():
+            return seen
+        changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
+        if self._running is None and (changed or self._age >= _FRAMES):
             self._size_mm, self._age = patch.size_mm, 0
             self._running = _Comparison(seen, self.witness.looking(image, markers_px))
         if self._running is not None:
             self._running.go_on()
         return seen
+
+    def _gives_way(self) -> bool:
+        """Whether a comparison waits because the patch was searched for, but not for ever."""
+        waits = self.named.finder.searched and self._waited < _WAITS
+        self._waited = self._waited + 1 if waits else 0
+        return waits
 
     def motion(self, seen: Any, lateral_mm: Array | None = None) -> NormalReading:
         """Motion under the named indenter; unknown where it is not the one that touches."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from pressed_samples import Pressed, calibration, lit_bundle, reference
 from pressed_shapes import Shape, ball, edge, pressed_shape, punch, rod, two_balls
 from shaded_frames import shaded
 
+from gelslim_force.contact.normal_motion import IndenterSource
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.checked_indenter import CheckedIndenter
@@ -168,6 +170,41 @@ def test_the_comparison_every_ten_frames_is_spread_over_several(
     assert len(busy) > 2
     forces = [found.force_n[:, 2].sum() for _, found in judged]
     np.testing.assert_allclose(forces, forces[0], rtol=0.02)
+
+
+@pytest.mark.slow
+def test_a_patch_that_grows_is_judged_within_a_few_frames(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A ball of half the radius follows: the search for its patch comes before the comparison."""
+    right = pressed_shape(ball(6.0), 0.2, (1.0, -1.0), 0.0, 3)
+    wrong = pressed_shape(ball(3.0), 0.6, (1.0, -1.0), 0.0, 4)
+    chain, counts = checked("sphere:6"), solutions_of(monkeypatch)
+    source = chain.normal
+    assert isinstance(source, CheckedIndenter)
+    chain.reset()
+    assert chain.process(right.image).normal_known
+    known, searched = [], []
+    for _ in range(9):
+        counts.append(0)
+        known.append(chain.process(wrong.image).normal_known)
+        searched.append(source.named.finder.searched)
+    busy = np.flatnonzero(counts[1:])
+    assert max(counts[1:]) <= 2
+    assert not any(searched[frame] for frame in busy)
+    # The verdict of the ball before holds until the comparison ends.
+    assert known == [frame < busy[-1] for frame in range(9)]
+    assert 0 < busy[0] < busy[-1] < 7
+
+
+@pytest.mark.parametrize("searched", [True, False])
+def test_a_comparison_does_not_wait_for_ever(searched: bool) -> None:
+    source = CheckedIndenter(
+        cast("IndenterSource", SimpleNamespace(finder=SimpleNamespace(searched=searched))),
+        cast("UnknownShape", SimpleNamespace(reset=lambda: None)),
+    )
+    waits = [source._gives_way() for _ in range(8)]
+    assert waits == [searched and number % 4 < 3 for number in range(8)]
 
 
 @pytest.mark.slow
