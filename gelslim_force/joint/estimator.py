@@ -143,7 +143,7 @@ class JointEstimator:
         """Those of the nodes (c,) that press in an estimate, and what they enclose."""
         pressure = -state.force_n[:, 2] / self.area_mm2
         least = least_pressure_at(self.settings, self.deepness(state))
-        return pressing_nodes(nodes, pressure, self.neighbours, least)
+        return pressing_nodes(nodes, pressure, self.around, least)
 
     def shown(self, image: NDArray[np.uint8], markers_px: Array) -> Mask:
         """(c,) nodes whose slope the light of a frame shows; arguments and errors as in `frame`."""
@@ -274,6 +274,12 @@ class JointEstimator:
         error = math.hypot(self.settings.light_error, share * rms_length(bins.change.T))
         height = moved_mm[:, 2] if finer_mm is None else finer_mm
         return bins.sums(self.law, height, state.gain, error)
+
+    @cached_property
+    def around(self) -> sparse.csr_array:
+        """(c, c) by which a value becomes the mean of those of a node's neighbours."""
+        share = 1 / np.maximum(self.neighbours.sum(axis=1), 1)
+        return sparse.csr_array(sparse.diags_array(share) @ self.neighbours)
 
     @cached_property
     def near_edge(self) -> Mask:

@@ -110,15 +110,13 @@ def _parts(nodes: Mask, lattice: NodeLattice) -> NDArray[np.int32]:
     return np.asarray(parts[lattice.place[:, 0], lattice.place[:, 1]])
 
 
-def pressing_nodes(
-    region: Mask, pressure: Array, neighbours: sparse.csr_array, least: float
-) -> Mask:
+def pressing_nodes(region: Mask, pressure: Array, around: sparse.csr_array, least: float) -> Mask:
     """(c,) nodes of a region that press, alone and with their neighbours.
 
     Args:
         region: (c,) nodes that may press.
         pressure: (c,) estimate, with errors from node to node.
-        neighbours: (c, c) with 1 where nodes share an edge of a cell.
+        around: (c, c) by which a value becomes the mean of those of a node's neighbours.
         least: Share of the mean pressure, weighted by itself, that the mean of a node and its
             neighbours has to reach.
 
@@ -127,7 +125,7 @@ def pressing_nodes(
     """
     if not (pressure > 0).any():
         return region
-    about = (neighbours @ pressure) / np.maximum(neighbours.sum(axis=1), 1)
+    about = around @ pressure
     mean = float(pressure @ pressure) / float(pressure.sum())
     pressing = region & ((pressure + about) / 2 > least * mean)
     return np.asarray(pressing if pressing.any() else region)

@@ -57,7 +57,7 @@ class LightSums:
         """The gain that fits best after the heights changed by (m,), with a prior about 1."""
         own = self.by_gain + sigma**-2
         pull = self.gain_pull - float(self.mixed @ height_mm) + (1 - self.gain) / sigma**2
-        return float(np.clip(self.gain + pull / own, *_GAINS))
+        return min(max(self.gain + pull / own, _GAINS[0]), _GAINS[1])
 
     def unexplained(self, height_mm: Array) -> float:
         """Share of the change of light that is left after the heights changed by (m,).
