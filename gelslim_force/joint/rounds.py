@@ -28,9 +28,10 @@ Steps = Generator[None, None, Found]
 """Stops between steps, and returns what they find."""
 Estimate = tuple[Mask, FitState]
 """Nodes (c,) that may press, and the estimate."""
-_SETTLED, _FAR, _LOST = 0.01, 0.2, 0.03
+_SETTLED, _FAR, _FAR_ON_LEVEL, _LOST = 0.01, 0.2, 0.35, 0.03
 """Shares of the force. A change below the first one ends the linearisations. One more is needed for
-a change above the second one since the last frame, and if nodes with the third one are left out."""
+a change since the last frame above the second one, or the third where the surface moved so little
+that linear data hold, and if nodes with the last one are left out."""
 _HELD_SLOPE, _HELD_BETWEEN = 0.07, 0.19
 """Changes of the surface, over the spacing of the nodes, up to which linear data hold: for contacts
 that are not deep, and for forces that another linearisation follows. Forces of 64 random contacts
@@ -84,7 +85,8 @@ def _last_rounds(estimator: JointEstimator, frame: FrameData, begun: Estimate) -
     for _ in range(rounds[0]):
         yield
         state = estimator.solution(frame, np.flatnonzero(nodes), state)
-    if is_far := not state.near(begun[1], _FAR):
+    level = _moved_by(estimator, state) <= _HELD_SLOPE
+    if is_far := not state.near(begun[1], _FAR_ON_LEVEL if level else _FAR):
         yield
         state = estimator.solution(frame, np.flatnonzero(nodes), state)
     nodes, deep = estimator.pressing(nodes, state), estimator.deepness(state) > 0
@@ -135,11 +137,17 @@ def _held(
         return None
     data = state.data.on(nodes)
     found = estimator.solved(data)
-    slope = np.abs(found.displacement_mm - data.moved_mm).max() / estimator.lattice.step_mm.min()
-    if slope > most_slope:
+    if _moved_by(estimator, found) > most_slope:
         return None
     # As in every round, residuals are those of the forces before it.
     return replace(found, markers=data.markers.after(state.force_n[nodes].ravel() - data.start))
+
+
+def _moved_by(estimator: JointEstimator, state: FitState) -> float:
+    """Change of the surface since its data were linearised, over the spacing of the nodes."""
+    assert state.data is not None
+    moved = np.abs(state.displacement_mm - state.data.moved_mm).max()
+    return float(moved / estimator.lattice.step_mm.min())
 
 
 def _settled(
