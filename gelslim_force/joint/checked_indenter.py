@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.uncertainty import with_sigma
 from gelslim_force.contact.normal_motion import IndenterSource
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch
@@ -38,13 +39,13 @@ _WAITS = 3
 _GROWN = 0.1
 """Change of the patch's size from which it is compared before that."""
 _ANOTHER = (
-    "light and markers show a force of {seen:.2f} ± {sigma:.2f} N, the indenter as named would "
-    "press with {named:.2f} N: another shape or size touches the gel; name that, or leave the "
+    "light and markers show a force of {seen} N, the indenter as named would "
+    "press with {named:.2g} N: another shape or size touches the gel; name that, or leave the "
     "indenter out"
 )
 _NO_CONTACT = (
     "the light is not that of a contact with the indenter as named: light and markers show none, "
-    "where it would press with {named:.2f} N"
+    "where it would press with {named:.2g} N"
 )
 
 
@@ -105,9 +106,10 @@ class CheckedIndenter:
     """`NormalSource` of a named indenter that another one confirms.
 
     It compares the forces in the first frame of a contact, when the patch grows or shrinks, and
-    every ten frames; the verdict holds in between. A new contact is judged at once. The work of the
-    other comparisons is spread over the frames after the one that they are of, and waits where the
-    patch is searched for anew. Neither depends on time.
+    every ten frames; the verdict holds in between. A new contact is judged at once, and so is a
+    patch that changed while the verdict is against the indenter. The work of the other comparisons
+    is spread over the frames after the one that they are of, and waits where the patch is searched
+    for anew. Neither depends on time.
 
     Attributes:
         named: The named indenter.
@@ -136,8 +138,9 @@ class CheckedIndenter:
             return patch
         lost = bool(np.isnan(markers_px).any())
         shown = self.witness.estimator.shown(image, markers_px) if lost else None
-        if self._size_mm == 0.0:
-            self._size_mm = patch.size_mm
+        changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
+        if self._size_mm == 0.0 or (changed and self._verdict != _Verdict()):
+            self._size_mm, self._age, self._running = patch.size_mm, 0, None
             return SeenIndenter(patch, self.witness.look(image, markers_px), True, shown)
         seen = SeenIndenter(patch, None, False, shown)
         self._age += 1
@@ -145,7 +148,6 @@ class CheckedIndenter:
             self._running = None
         if self._gives_way():
             return seen
-        changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
         if self._running is None and (changed or self._age >= _FRAMES):
             self._size_mm, self._age = patch.size_mm, 0
             self._running = _Comparison(seen, self.witness.looking(image, markers_px))
@@ -192,4 +194,4 @@ class CheckedIndenter:
         allowed = _SIGMAS * sigma + _MODEL_ERROR * max(abs(seen), abs(named))
         if abs(named - seen) <= allowed:
             return _Verdict()
-        return _Verdict(_ANOTHER.format(seen=seen, sigma=sigma, named=named))
+        return _Verdict(_ANOTHER.format(seen=with_sigma(seen, sigma), named=named))

@@ -83,13 +83,19 @@ def sliding_friction_bound(c: Circumstances) -> Bound:
 
 
 def sliding_friction_ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """Ways of the tool in one step. Where it sticks and slips, no step tells when it slips."""
+    """Ways of the tool in one step.
+
+    Where the tool sticks and slips, no step tells when it slips, and at a wall that slides none
+    tells when it lets go of a node: half the way of a step moves that by a pose, in solved contacts
+    of a flat punch with a sixth of the tangential force.
+    """
+    is_open = is_jerky(c) or c.has_sliding_walls
     whole, nodes = sliding_friction_bound(c), c.sensor.surface_nodes * c.sensor.layers / (43**2 * 4)
     length_mm = _given(c).memory_mm
     return tuple(
         Rung(
             name,
-            whole if is_jerky(c) else whole.times(min(1.0, COURSE * share)),
+            whole if is_open else whole.times(min(1.0, COURSE * share)),
             0.1 + STEP_MS * nodes * max(0.0, c.motion.step_aside_mm / (share * length_mm) - 1),
             {"step_share": share},
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -195,6 +196,19 @@ def test_a_patch_that_grows_is_judged_within_a_few_frames(
     # The verdict of the ball before holds until the comparison ends.
     assert known == [frame < busy[-1] for frame in range(9)]
     assert 0 < busy[0] < busy[-1] < 7
+
+
+@pytest.mark.slow
+def test_a_refusal_does_not_outlive_the_patch_that_it_is_of() -> None:
+    """A press may have three frames; the named ball is known in the first that fits."""
+    wrong = pressed_shape(ball(3.0), 0.3, (1.0, -1.0), 0.0, 4)
+    right = pressed_shape(ball(6.0), 0.35, (1.0, -1.0), 0.0, 3)
+    chain = checked("sphere:6")
+    chain.reset()
+    refused = chain.process(wrong.image)
+    assert not refused.normal_known
+    assert re.search(r"force of -\d+\.\d+ ± 0\.\d*[1-9]\d* N", refused.problems[-1])
+    assert chain.process(right.image).normal_known
 
 
 @pytest.mark.parametrize("searched", [True, False])

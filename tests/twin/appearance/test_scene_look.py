@@ -93,7 +93,7 @@ def test_a_look_is_calibrated_and_a_scene_drawn_with_it(tmp_path: Path, capsys) 
     assert record["format"] == "gelslim-look/1"
     assert [press["picture"] for press in record["judged"]["presses"]] == ["p1.png", "p2.png"]
     assert record["gel"] == record["judged"]["gel"]
-    assert record["gel"]["law"] == record["gel"]["asked"] == "linear"
+    assert record["gel"]["law"] == record["gel"]["asked"] == "auto"
     assert record["gel"]["presses"] == {"linear": 2, "neo_hookean": 0, "deep_linear": 0}
     assert page.read_text(encoding="utf-8").count("data:image/png;base64,") == 3
     found = read_look(look)

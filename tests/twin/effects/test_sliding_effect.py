@@ -133,6 +133,13 @@ def test_a_gel_that_cannot_hold_the_tool_makes_it_stick_and_slip() -> None:
     assert times == sorted(times)
 
 
+def test_at_a_wall_that_slides_no_rung_promises_less_than_the_size() -> None:
+    """When it lets go of a row of nodes changes with the way of a step, at 1/64 and 1/128 too."""
+    c = asked(TOOLS["punch"], LAWS["rises"], poses(3.0))
+    assert not is_jerky(c)
+    assert all(rung.error == sliding_friction_bound(c) for rung in sliding_friction_ladder(c))
+
+
 def test_a_scene_solves_it_and_refuses_it_at_large_strain(tmp_path: Path) -> None:
     small_sensor(tmp_path)
     law = "sliding_friction: {use: on, kinetic: 0.3, speed_mm_s: 2}"
