@@ -16,6 +16,7 @@ LINES = {
     signal.SIGINT: "Interrupted; every file that is there is whole.\n",
     signal.SIGTERM: "Terminated; every file that is there is whole.\n",
 }
+REMARK = "gelslim: "
 JUNK = (".part", ".lock", ".building", ".old")
 
 
@@ -34,13 +35,15 @@ class Interrupted:
     def was_one_line(self) -> bool:
         """Hold it to one line and the status of the signal, or to its work; True for the line.
 
-        Before the first line it is the interpreter that ends, in its own words or none.
+        Before the first line it is the interpreter that ends, in its own words or none. What the
+        command remarks on its input comes before the line, or stands alone.
         """
         if not self.began:
             return False
         assert self.status in (0, 128 + self.number), (self.status, self.err)
         told = LINES[self.number] if self.status else ""
-        assert self.err == told, (self.status, self.err)
+        lines = self.err.splitlines(keepends=True)
+        assert "".join(line for line in lines if not line.startswith(REMARK)) == told, self
         assert "Traceback" not in self.out, self.out
         return bool(self.status)
 
