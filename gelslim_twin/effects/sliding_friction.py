@@ -85,9 +85,9 @@ def sliding_friction_bound(c: Circumstances) -> Bound:
 def sliding_friction_ladder(c: Circumstances) -> tuple[Rung, ...]:
     """Ways of the tool in one step.
 
-    Where the tool sticks and slips, no step tells when it slips, and at a wall that slides none
-    tells when it lets go of a node: half the way of a step moves that by a pose, in solved contacts
-    of a flat punch with a sixth of the tangential force.
+    Where the tool sticks and slips, no step tells when it slips, and at a wall that slides no step
+    tells when it lets go of a row of nodes. In solved contacts of a flat punch, steps half as long
+    let go a pose earlier or later, and the tangential force of that pose differs by a sixth.
     """
     is_open = is_jerky(c) or c.has_sliding_walls
     whole, nodes = sliding_friction_bound(c), c.sensor.surface_nodes * c.sensor.layers / (43**2 * 4)
