@@ -92,18 +92,21 @@ class NormalModel:
         touched, push, factor = self._contact(gap, patch)
         if not len(touched):
             return self._unknown("the patch contains no surface node of the pad")
-        sensitivity = self._sensitivity(patch, indenter, touched)
-        moved = self.compliance.apply(
-            touched, np.column_stack([push, cho_solve(factor, sensitivity)])
-        )
-        by = np.column_stack([moved[:, 2], moved[:, 3], growth * moved[:, 1], moved[:, 4]])
-        variance = np.einsum("ci,ij,cj->c", by, patch.covariance, by) + (moved[:, 1] * spread) ** 2
-        w = -moved[:, 0]
+        by_place = cho_solve(factor, self._sensitivity(patch, indenter, touched))
+        moved = self.compliance.apply(touched, np.column_stack([push, by_place]))
+
+        def deviation(by: Array) -> Array:
+            """Of what has the derivatives (n, 4) by depth, x, y and angle."""
+            of_patch = by[:, [1, 2, 0, 3]] * [1.0, 1.0, growth, 1.0]
+            variance = np.einsum("ci,ij,cj->c", of_patch, patch.covariance, of_patch)
+            return np.asarray(np.sqrt(np.maximum(variance + (by[:, 0] * spread) ** 2, 0)))
+
+        w, sigma = -moved[:, 0], deviation(moved[:, 1:])
         w[touched] = -gap[touched]
         mask = np.zeros(len(w), dtype=bool)
         mask[touched] = True
-        sigma = np.sqrt(np.maximum(variance, 0))
-        return NormalReading(w, sigma, mask, depth_mm=depth, push_n=float(push.sum()))
+        total, total_sigma = float(push.sum()), float(deviation(by_place.sum(axis=0)[None])[0])
+        return NormalReading(w, sigma, mask, depth_mm=depth, push_n=total, push_sigma_n=total_sigma)
 
     def cap_only(self, patch: ContactPatch, indenter: Indenter) -> NormalReading:
         """The paper's model: the indenter's cap below the rim of the patch, and no motion outside.

@@ -64,6 +64,7 @@ class NormalReading:
         by_gel_mm: (p, c) derivative of the motion by ln thickness and by Poisson's ratio of the
             gel; None where it does not depend on them, or is not computed.
         push_n: Normal force of the contact model, positive; NaN without one.
+        push_sigma_n: Standard deviation of `push_n` from those of the patch and of the depth.
         hidden_n: Standard deviation of the normal force of a contact that is not seen; 0 where one
             is seen, or would be.
         shown: (c,) nodes whose motion the source sees where their markers are lost; None where it
@@ -79,6 +80,7 @@ class NormalReading:
     forces: FoundForces | None = None
     by_gel_mm: Array | None = None
     push_n: float = float("nan")
+    push_sigma_n: float = float("nan")
     hidden_n: float = 0.0
     shown: NDArray[np.bool_] | None = None
 

@@ -28,6 +28,9 @@ Mask = NDArray[np.bool_]
 _SIGMAS = 2.0
 _MODEL_ERROR = 0.15
 """Error of the named indenter's force by outline, mesh and friction, over the larger force."""
+_MOST_NAMED = 0.05
+"""Largest standard deviation of the named indenter's force that counts, over the larger force: the
+patch of another shape may have any size."""
 _FRAMES = 10
 """Frames of a contact after which it is compared again."""
 _SOLUTIONS = 2
@@ -191,7 +194,9 @@ class CheckedIndenter:
         if abs(found.gain - 1) > self.witness.most_gain:
             return _Verdict()  # The light itself is not the traced one, and is no witness.
         seen, sigma = float(found.force_n[:, 2].sum()), float(np.sqrt(found.covariance[2, 2]))
-        allowed = _SIGMAS * sigma + _MODEL_ERROR * max(abs(seen), abs(named))
+        larger = max(abs(seen), abs(named))
+        own = min(reading.push_sigma_n, _MOST_NAMED * larger)
+        allowed = _SIGMAS * float(np.hypot(sigma, own)) + _MODEL_ERROR * larger
         if abs(named - seen) <= allowed:
             return _Verdict()
         return _Verdict(_ANOTHER.format(seen=with_sigma(seen, sigma), named=named))

@@ -246,6 +246,8 @@ def test_uncertainty_is_that_of_drawn_patches():
     depths = np.array([d.depth_mm for d in draws])
     stated = depth_sigma_mm(model, motion, mean[:2])
     assert stated == pytest.approx(depths.std(), rel=0.25)
+    pushes = np.array([d.push_n for d in draws])
+    assert motion.push_sigma_n == pytest.approx(pushes.std(), rel=0.25)
     seen = np.std([d.w_mm for d in draws], axis=0)
     stated = motion.sigma_mm
     clear = seen > 0.3 * seen.max()

@@ -221,6 +221,29 @@ def test_a_comparison_does_not_wait_for_ever(searched: bool) -> None:
     assert waits == [searched and number % 4 < 3 for number in range(8)]
 
 
+@pytest.mark.parametrize(
+    ("push_n", "push_sigma_n", "refused"),
+    [(0.19, 0.012, False), (0.19, 0.001, True), (0.31, 0.015, False), (0.12, 0.1, True)],
+)
+def test_the_size_of_the_patch_is_known_as_well_as_it_says(
+    push_n: float, push_sigma_n: float, refused: bool
+) -> None:
+    """A force that could be any confirms nothing, though it does not contradict."""
+    source = CheckedIndenter(
+        cast("IndenterSource", None),
+        cast("UnknownShape", SimpleNamespace(reset=lambda: None, most_gain=0.3)),
+    )
+    reading = replace(NormalReading.given(1, [-0.1], 0.0), push_n=push_n, push_sigma_n=push_sigma_n)
+    seen = SimpleNamespace(
+        gain=1.0,
+        unexplained=0.0,
+        force_n=np.array([[0.0, 0.0, -0.24]]),
+        covariance=np.diag([0.0, 0.0, 0.005**2]),
+    )
+    verdict = source._compared(reading, cast("JointForces", seen))
+    assert bool(verdict.problem) is refused
+
+
 @pytest.mark.slow
 def test_three_solutions_give_the_force_of_five() -> None:
     rng = np.random.default_rng(5)
