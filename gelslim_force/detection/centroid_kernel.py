@@ -22,7 +22,6 @@ from numba import njit
 from gelslim_core.kernel_cache import drop_stale
 from gelslim_force.detection.ring_kernel import (
     SUMS,
-    ring_level,
     ring_light,
     ring_pixels,
     ring_sums,
@@ -30,9 +29,7 @@ from gelslim_force.detection.ring_kernel import (
 from gelslim_force.detection.window_kernel import (
     COMPILED,
     LANES,
-    MASS,
     QUANTITIES,
-    SQUARE,
     SU,
     SUU,
     SUV,
@@ -40,6 +37,7 @@ from gelslim_force.detection.window_kernel import (
     SVV,
     WEIGHT,
     ellipse,
+    window_contrast,
     window_sums,
 )
 
@@ -84,8 +82,9 @@ def _light_plane(picture: Any, width: Any, ring: Any, plane: Any, work: Any) -> 
         listed[3] = ring_pixels(inner, outer, most, picture.shape[1], u, v, steps)
         listed[4] = max(outer[3], outer[4])
     count, reach = int(listed[3]), listed[4]
-    count = ring_light(picture, width, ring[0], ring[1], reach, u, v, steps, count, light)
-    n, total, squares = ring_level(light, count)
+    count, n, total, squares = ring_light(
+        picture, width, ring[0], ring[1], reach, u, v, steps, count, light
+    )
     if n < _LEAST_RING:
         return False
     plane[0], plane[1], plane[2] = total / n, 0.0, 0.0
@@ -133,13 +132,12 @@ def _contrast(picture: Any, width: Any, ring: Any, work: Any) -> Any:
 
     The contrast is the mean darkness, weighted by darkness.
     """
-    plane, sums, lanes, of_ring = work
+    plane, _, lanes, of_ring = work
     if not _light_plane(picture, width, ring, plane, of_ring):
         return 0.0
     window = ellipse(ring[2], ring[3], ring[4], _WINDOW, _WINDOW_MARGIN_PX)
     light = (plane[0], plane[1], plane[2])
-    window_sums(picture, width, ring[0], ring[1], window, light, 0.0, 1.0, lanes, sums)
-    return sums[SQUARE] / sums[MASS] if sums[MASS] > 0 else 0.0
+    return window_contrast(picture, width, ring[0], ring[1], window, light, lanes)
 
 
 @njit(**COMPILED)
@@ -232,8 +230,7 @@ def _ring_work(moments: Any, widest: Any, shape: Any) -> Any:
     reach = 2 * _RING[1] * math.sqrt(2.5 * largest) + _RING_MARGIN_PX[1]
     most = int(min(reach, float(max(shape[0], shape[1]))))
     size = (2 * most + 1) ** 2 + LANES
-    # Zeros, because what follows the last place of a ring is multiplied by a weight of 0.
-    u, v = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.float32)
+    u, v = np.empty(size, dtype=np.float32), np.empty(size, dtype=np.float32)
     steps, light = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int32)
     lanes = np.empty(SUMS * LANES, dtype=np.float32)
     return most, u, v, steps, light, np.zeros(5), np.empty(2), lanes
@@ -262,7 +259,7 @@ def measure(
     dot's darkness between which the weight rises. A dot that is not found has area 0.
     """
     lanes = np.empty(QUANTITIES * LANES, dtype=np.float32)
-    work = np.empty(3), np.empty(8), lanes, _ring_work(moments, widest, picture.shape)
+    work = np.empty(3), np.empty(6), lanes, _ring_work(moments, widest, picture.shape)
     limits, moment = (widest, faintest, most), np.empty(3)
     for i in range(starts.shape[0]):
         out[i] = 0.0
@@ -270,7 +267,7 @@ def measure(
         out[i, CX], out[i, CY] = x0, y0
         known = x0 >= 0 and y0 >= 0 and x0 <= width - 1 and y0 <= picture.shape[0] - 1
         known = known and math.isfinite(moments[i, 0] + moments[i, 1] + moments[i, 2])
-        moment[:] = moments[i]
+        moment[0], moment[1], moment[2] = moments[i, 0], moments[i, 1], moments[i, 2]
         start = (x0, y0, moment)
         if not known or not _measure_one(picture, width, start, limits, low, high, work, out[i]):
             out[i, AREA] = 0.0

@@ -27,7 +27,8 @@ def ring_pixels(inner: Any, outer: Any, most: Any, stride: Any, u: Any, v: Any, 
 
     `steps` are the same in a picture whose rows follow each other by `stride`. The ellipses are
     those of `window_kernel`; what is further away than `most` px along an axis is left out, and
-    the arrays have room for (2 most + 1)² values. Returns the number of pixels.
+    the arrays have room for (2 most + 1)² + LANES values. The places of the last lanes, which are
+    those of no pixel, are 0. Returns the number of pixels.
     """
     zero = np.float32(0)
     count: Any = 0
@@ -40,6 +41,7 @@ def ring_pixels(inner: Any, outer: Any, most: Any, stride: Any, u: Any, v: Any, 
             at = np.float32(x)
             u[count], v[count], steps[count] = x, y, y * stride + x
             count += ((oa * at + ob) * at + oc <= zero) & ((ia * at + ib) * at + ic > zero)
+    u[count : count + LANES] = v[count : count + LANES] = zero
     return count
 
 
@@ -55,42 +57,37 @@ def ring_light(
     steps: Any,
     count: Any,
     light: Any,
-) -> int:
+) -> Any:
     """Write the light (n,) at the pixels of a ring around a whole pixel; -1 outside the picture.
 
     `picture` is as in `window_kernel`, and has `width` columns that count; the ring is within
-    `reach` px. Returns the number of values, rounded up to a multiple of `LANES`: the last ones are
-    those of no pixel.
+    `reach` px. Returns the number of values, rounded up to a multiple of `LANES`, the last ones
+    being those of no pixel; the number of pixels in the picture, the sum of their light, and that
+    of its square.
     """
     x0, y0 = int(x0), int(y0)
+    n, total, squares = np.int64(0), np.int64(0), np.int64(0)
     if reach <= min(min(x0, width - 1 - x0), min(y0, picture.shape[0] - 1 - y0)):
-        pixels, middle = picture.reshape(-1), y0 * picture.shape[1] + x0
+        pixels, middle, n = picture.reshape(-1), y0 * picture.shape[1] + x0, np.int64(count)
         for k in range(count):
-            light[k] = pixels[np.uint64(middle + steps[k])]
+            value = np.int32(pixels[np.uint64(middle + steps[k])])
+            light[k] = value
+            total += value
+            squares += np.int32(value * value)
     else:
         for k in range(count):
             x, y = x0 + int(u[k]), y0 + int(v[k])
-            seen = (x >= 0) & (y >= 0) & (x < width) & (y < picture.shape[0])
-            light[k] = picture[y, x] if seen else _OUTSIDE
+            light[k] = _OUTSIDE
+            if (x >= 0) & (y >= 0) & (x < width) & (y < picture.shape[0]):
+                value = np.int32(picture[y, x])
+                light[k] = value
+                n += 1
+                total += value
+                squares += np.int32(value * value)
     while count % LANES:
         light[count] = _OUTSIDE
         count += 1
-    return count
-
-
-@njit(**COMPILED)
-def ring_level(light: Any, count: Any) -> Any:
-    """Number of pixels in the picture, sum of their light and of its square."""
-    n: Any = 0
-    total: Any = 0
-    squares: Any = 0
-    for k in range(count):
-        seen = light[k] >= 0
-        value = light[k] if seen else np.int32(0)
-        n += seen
-        total += value
-        squares += np.int32(value * value)
-    return n, total, squares
+    return count, n, total, squares
 
 
 @njit(**COMPILED)
@@ -103,7 +100,8 @@ def ring_sums(u: Any, v: Any, light: Any, count: Any, plane: Any, limits: Any, l
     one, zero = np.float32(1), np.float32(0)
     level, across, down = np.float32(plane[0]), np.float32(plane[1]), np.float32(plane[2])
     low, high = np.float32(limits[0]), np.float32(limits[1])
-    lanes[:] = zero
+    for i in range(SUMS * LANES):
+        lanes[i] = zero
     for first in range(0, count, LANES):
         us, vs, values = u[first:], v[first:], light[first:]
         for i in range(LANES):

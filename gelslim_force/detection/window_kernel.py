@@ -25,9 +25,10 @@ COMPILED: dict[str, Any] = {
     "fastmath": {"contract", "nsz"},
 }
 LANES = 16
-QUANTITIES = 5
-MASS, SQUARE, WEIGHT, SU, SV, SUU, SUV, SVV = range(8)
-"""Sums over a window: darkness, its square, weights, and the weights' first and second moments."""
+QUANTITIES = 3
+"""Most sums of columns that a window has."""
+WEIGHT, SU, SV, SUU, SUV, SVV = range(6)
+"""Sums over a window: weights, and their first and second moments."""
 
 
 @njit(**COMPILED)
@@ -61,45 +62,52 @@ def box(shape: Any, width: Any, height: Any, x0: Any, y0: Any) -> Any:
 
 
 @njit(**COMPILED)
-def _window_lanes(
-    picture: Any,
-    first: Any,
-    last: Any,
-    top: Any,
-    bottom: Any,
-    x0: Any,
-    y0: Any,
-    window: Any,
-    plane: Any,
-    scale: Any,
-    offset: Any,
-    lanes: Any,
-) -> None:
-    """Write sums over the rows of a window for the columns from `first` on, up to `last`."""
+def _darkness(row: Any, i: Any, start: Any, base: Any, rise: Any, across: Any, more: Any) -> Any:
+    """Distance `u` of a column from the centre, and its darkness; 0 outside the window.
+
+    `across` are the factors of u², u and 1 in a row of the ellipse, and `more` is the last column.
+    """
     one, zero = np.float32(1), np.float32(0)
-    wa, rise = np.float32(window[0]), np.float32(plane[1])
-    start, more = np.float32(first - x0), np.int32(last - first)
-    scale, offset = np.float32(scale), np.float32(offset)
-    lanes[:] = zero
-    for y in range(top, bottom + 1):
-        height = y - y0
-        v = np.float32(height)
-        wb, wc = np.float32(2 * window[1] * height), np.float32(window[2] * height * height - 1)
-        base = np.float32(plane[0] + plane[2] * height)
-        row = picture[y, first : first + LANES]
+    u = np.float32(i) + start
+    dark = one - np.float32(row[i]) / max(base + rise * u, one)
+    inside = ((across[0] * u + across[1]) * u + across[2] <= zero) & (np.int32(i) <= more)
+    return dark if inside else zero
+
+
+@njit(**COMPILED)
+def _across(window: Any, height: Any) -> Any:
+    """Factors of u², u and 1 of an ellipse in the row at `height` from its centre."""
+    return (
+        np.float32(window[0]),
+        np.float32(2 * window[1] * height),
+        np.float32(window[2] * height * height - 1),
+    )
+
+
+@njit(**COMPILED)
+def window_contrast(
+    picture: Any, width: Any, x0: Any, y0: Any, window: Any, plane: Any, lanes: Any
+) -> Any:
+    """The mean darkness of a window, weighted by darkness; 0 where nothing is dark."""
+    left, right, top, bottom = box(window, width, picture.shape[0], x0, y0)
+    zero, rise = np.float32(0), np.float32(plane[1])
+    mass = square = 0.0
+    for first in range(left, right + 1, LANES):
+        start, more = np.float32(first - x0), np.int32(right - first)
+        for i in range(2 * LANES):
+            lanes[i] = zero
+        for y in range(top, bottom + 1):
+            height = y - y0
+            across, base = _across(window, height), np.float32(plane[0] + plane[2] * height)
+            row = picture[y, first : first + LANES]
+            for i in range(LANES):
+                dark = max(_darkness(row, i, start, base, rise, across, more), zero)
+                lanes[i] += dark
+                lanes[LANES + i] += dark * dark
         for i in range(LANES):
-            u = np.float32(i) + start
-            dark = one - np.float32(row[i]) / max(base + rise * u, one)
-            inside = ((wa * u + wb) * u + wc <= zero) & (np.int32(i) <= more)
-            dark = dark if inside else zero
-            positive = max(dark, zero)
-            weight = min(max(dark * scale - offset, zero), one)
-            side = weight * v
-            lanes[i] += positive
-            lanes[LANES + i] += positive * positive
-            lanes[2 * LANES + i] += weight
-            lanes[3 * LANES + i] += side
-            lanes[4 * LANES + i] += side * v
+            mass += lanes[i]
+            square += lanes[LANES + i]
+    return square / mass if mass > 0 else 0.0
 
 
 @njit(**COMPILED)
@@ -115,22 +123,33 @@ def window_sums(
     lanes: Any,
     sums: Any,
 ) -> None:
-    """Write the sums (8,) over a window; weights rise from 0 to 1 between two darknesses."""
+    """Write the sums (6,) over a window; weights rise from 0 to 1 between two darknesses."""
     left, right, top, bottom = box(window, width, picture.shape[0], x0, y0)
-    scale, offset = 1 / (high - low), low / (high - low)
-    sums[:] = 0.0
+    scale, offset = np.float32(1 / (high - low)), np.float32(low / (high - low))
+    one, zero, rise = np.float32(1), np.float32(0), np.float32(plane[1])
+    for i in range(SVV + 1):
+        sums[i] = 0.0
     for first in range(left, right + 1, LANES):
-        _window_lanes(
-            picture, first, right, top, bottom, x0, y0, window, plane, scale, offset, lanes
-        )
+        start, more = np.float32(first - x0), np.int32(right - first)
+        for i in range(QUANTITIES * LANES):
+            lanes[i] = zero
+        for y in range(top, bottom + 1):
+            height = y - y0
+            across, base = _across(window, height), np.float32(plane[0] + plane[2] * height)
+            v, row = np.float32(height), picture[y, first : first + LANES]
+            for i in range(LANES):
+                dark = _darkness(row, i, start, base, rise, across, more)
+                weight = min(max(dark * scale - offset, zero), one)
+                side = weight * v
+                lanes[i] += weight
+                lanes[LANES + i] += side
+                lanes[2 * LANES + i] += side * v
         for i in range(LANES):
             u = first + i - x0
-            weight, side = float(lanes[2 * LANES + i]), float(lanes[3 * LANES + i])
-            sums[MASS] += lanes[i]
-            sums[SQUARE] += lanes[LANES + i]
+            weight, side = float(lanes[i]), float(lanes[LANES + i])
             sums[WEIGHT] += weight
             sums[SU] += weight * u
             sums[SV] += side
             sums[SUU] += weight * u * u
             sums[SUV] += side * u
-            sums[SVV] += lanes[4 * LANES + i]
+            sums[SVV] += lanes[2 * LANES + i]

@@ -64,7 +64,7 @@ def test_an_ellipse_has_the_axes_of_its_moments() -> None:
 
 def test_sums_over_windows_are_those_of_all_pixels() -> None:
     rng = np.random.default_rng(2)
-    image, lanes, sums = picture(rng), np.empty(wk.QUANTITIES * wk.LANES, np.float32), np.empty(8)
+    image, lanes, sums = picture(rng), np.empty(wk.QUANTITIES * wk.LANES, np.float32), np.empty(6)
     low, high = 0.1, 0.7
     for x0, y0, *moments in places(rng, 40):
         window = wk.ellipse(*moments, 1.1, 1.5)
@@ -73,7 +73,10 @@ def test_sums_over_windows_are_those_of_all_pixels() -> None:
         dark = np.where(inside(window, u, v), 1 - image[:, :WIDTH] / light(u, v), 0)
         mass = np.maximum(dark, 0)
         weight = np.clip((dark - low) / (high - low), 0, 1)
-        parts = (mass, mass**2, weight, weight * u, weight * v)
+        contrast = wk.window_contrast(image, WIDTH, x0, y0, window, PLANE, lanes)
+        expected = (mass**2).sum() / mass.sum() if mass.any() else 0.0
+        assert contrast == pytest.approx(expected, rel=2e-5)
+        parts = (weight, weight * u, weight * v)
         squares = (weight * u**2, weight * u * v, weight * v**2)
         truth = [part.sum() for part in (*parts, *squares)]
         assert sums == pytest.approx(truth, rel=2e-5, abs=2e-5 * np.abs(truth).max())
@@ -84,7 +87,7 @@ def test_sums_over_rings_are_those_of_all_pixels() -> None:
     rng, most = np.random.default_rng(3), 70
     image, lanes = picture(rng), np.empty(rk.SUMS * wk.LANES, np.float32)
     size = (2 * most + 1) ** 2 + wk.LANES
-    ring_u, ring_v = np.zeros(size, np.float32), np.zeros(size, np.float32)
+    ring_u, ring_v = np.full((2, size), np.nan, np.float32)
     steps, level = np.empty(size, np.int64), np.empty(size, np.int32)
     limits, inside_picture = np.array([-180.0, 250.0]), 0
     for x0, y0, *moments in places(rng, 40):
@@ -92,12 +95,14 @@ def test_sums_over_rings_are_those_of_all_pixels() -> None:
         inner, outer = wk.ellipse(*moments, 1.35, 1.5), wk.ellipse(*moments, 1.7, 3.5)
         count = rk.ring_pixels(inner, outer, most, image.shape[1], ring_u, ring_v, steps)
         reach = max(outer[3:])
-        count = rk.ring_light(image, WIDTH, x0, y0, reach, ring_u, ring_v, steps, count, level)
+        count, *levels = rk.ring_light(
+            image, WIDTH, x0, y0, reach, ring_u, ring_v, steps, count, level
+        )
         assert count % wk.LANES == 0
         u, v = around(x0, y0)
         ring = inside(outer, u, v) & ~inside(inner, u, v)
         values = image[:, :WIDTH][ring].astype(np.int64)
-        assert rk.ring_level(level, count) == (len(values), values.sum(), (values**2).sum())
+        assert levels == [len(values), values.sum(), (values**2).sum()]
         off = image[:, :WIDTH] - light(u, v)
         keep = ring & (off > limits[0]) & (off < limits[1])
         parts = (1 + 0 * u, u, v, u * u, u * v, v * v, off, u * off, v * off, off**2)
