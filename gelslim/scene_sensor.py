@@ -19,7 +19,7 @@ def sensor_figures(loaded: LoadedScene) -> SensorFigures:
     Raises InputError if the sensor is missing or its spec has faults, IfemError if the folder is
     not a bundle.
     """
-    from gelslim_twin.planning.question import bundle_figures
+    from gelslim_twin.planning.sensor_figures import bundle_figures
 
     _require_present(loaded)
     if loaded.scene.sensor.bundle is not None:
@@ -98,9 +98,9 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
     from gelslim_cad.dimensions import derive
     from gelslim_cad.gel import gel_skin
     from gelslim_cad.geometry.optics import camera_record
-    from gelslim_cad.sensor import marker_grid, pad_mesh
+    from gelslim_cad.sensor import marker_grid, pad_light, pad_mesh
     from gelslim_cad.tolerance.asked import read_spec
-    from gelslim_twin.planning.question import figures
+    from gelslim_twin.planning.sensor_figures import figures, least_light
 
     spec = read_spec(loaded.sensor_path).spec
     d = derive(spec)
@@ -108,9 +108,9 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
     mesh, _ = pad_mesh(d, grid)
     cells = mesh.occupancy.shape
     size = tuple(n * h for n, h in zip(cells, mesh.cell_size_mm, strict=True))
-    gel, skin = spec.material.gel, gel_skin(spec)
+    gel, skin, camera = spec.material.gel, gel_skin(spec), camera_record(d)
     return figures(
-        camera_record(d),
+        camera,
         size_mm=(float(size[0]), float(size[1]), float(size[2])),
         material=(gel.youngs_modulus_mpa, gel.poissons_ratio),
         surface_nodes=len(mesh.surface),
@@ -120,4 +120,5 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
         marker_diameter_mm=float(np.median(grid.diameter_mm)),
         skin_n_per_mm=0.0 if skin is None else skin.stiffness_n_per_mm,
         skin_friction=None if skin is None else skin.friction,
+        least_light=least_light(pad_light(d), grid.positions_mm, camera),
     )

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from gelslim_twin.effects.registry import EFFECTS
     from gelslim_twin.planning.plan import Plan
     from gelslim_twin.planning.planner import PlanError
-    from gelslim_twin.planning.question import bundle_figures, plan_scene
+    from gelslim_twin.planning.question import plan_scene
+    from gelslim_twin.planning.sensor_figures import bundle_figures
     from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
     from gelslim_twin.scene.reader import LoadedScene, read_scene
     from gelslim_twin.simulation.run_folder import SimulationError

@@ -23,7 +23,8 @@ from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.grey_sizes import SHADING
 from gelslim_twin.planning.plan import Plan, summed_error
 from gelslim_twin.planning.planner import make_plan
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.scene_task import planned, viewer_of

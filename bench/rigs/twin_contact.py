@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from bench.rigs.twin_rig import SCENES, turns_ms
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.planning.question import bundle_figures, plan_scene
+from gelslim_twin.planning.question import plan_scene
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor

@@ -21,7 +21,8 @@ from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.outputs.canvas import encoded
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.planning.question import bundle_figures, plan_scene
+from gelslim_twin.planning.question import plan_scene
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad

@@ -18,7 +18,8 @@ from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import make_plan
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_mechanics import mechanics_of

@@ -14,7 +14,7 @@ from gelslim_twin.datasets.job import DataSetJob, FrameChoice, gel_of
 from gelslim_twin.datasets.joint_plan import hardest, missed, plan_of_all
 from gelslim_twin.datasets.splits import division
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.planning.question import bundle_figures
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.scene_mechanics import can_be_probed, pad_compliance
 from gelslim_twin.simulation.scene_task import require_compatible, require_sensor_of_look

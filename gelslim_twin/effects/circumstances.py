@@ -35,9 +35,9 @@ class EffectParameters(Block):
 P = TypeVar("P", bound=EffectParameters)
 
 LEAST_LIGHT = 0.35
-"""Light on the darkest dots, over the mean of a lamp, summed over the channels, where it is not
-known: the traced guides of the designs leave 0.48 to 0.64 to all but a hundredth of the pad, and
-the lens takes up to a quarter at the corners of the picture."""
+"""Light on the darkest dots, over the mean of a lamp, summed over the channels, where that of the
+sensor does not count: photographed light, dirt, and lamps of any brightness. A sensor whose own
+light leaves less has its own."""
 
 
 @dataclass(frozen=True)

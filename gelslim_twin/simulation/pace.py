@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from gelslim_core.files.replaced_folder import scratch_folder
 from gelslim_twin.effects.circumstances import SensorFigures
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.planning.question import bundle_figures
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.planning.tolerance_ladder import GEL, LARGE_STRAIN, PICTURE, pace_group
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.scene_task import job_of

@@ -13,11 +13,8 @@ from gelslim_twin.planning.grey_sizes import PICTURED
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import Question
 from gelslim_twin.planning.probing import effects_to_probe, probe_ms
-from gelslim_twin.planning.question import (
-    bundle_figures,
-    plan_asked,
-    question,
-)
+from gelslim_twin.planning.question import plan_asked, question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.built_look import BuiltLook, LookError
 from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.reader import LoadedScene, read_scene

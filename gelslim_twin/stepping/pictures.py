@@ -18,7 +18,8 @@ from gelslim_core.yaml.suggest import closest
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.planner import PlanError, Question, make_plan
-from gelslim_twin.planning.question import bundle_figures, motion_figures
+from gelslim_twin.planning.question import motion_figures
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.pose import poses
 from gelslim_twin.scene.scene import FORMAT, Scene

@@ -240,7 +240,7 @@ def test_the_bundle_alone_is_loaded_as_it_was_written(sensor: Path, laddered: Bu
 @pytest.mark.slow
 def test_the_time_of_a_pose_is_measured_against_what_is_declared(tmp_path: Path) -> None:
     from gelslim.contacts import machine_paces, twin_key
-    from gelslim_twin.planning.question import bundle_figures
+    from gelslim_twin.planning.sensor_figures import bundle_figures
     from gelslim_twin.planning.tolerance_ladder import GEL, LARGE_STRAIN, PICTURE
 
     sys.path.insert(0, str(Path(__file__).parents[1] / "twin"))

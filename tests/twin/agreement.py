@@ -21,7 +21,8 @@ from gelslim_twin.effects.grey_values import MotionBlurParameters
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import Question, make_plan
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer

@@ -14,7 +14,8 @@ from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.effects.contact import FRICTION, NORMAL_CONTACT, RUNGS
 from gelslim_twin.effects.large_strain import NONLINEARITY
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.tools.tool import Tool
 from ifem_export.bundle.files import load_bundle

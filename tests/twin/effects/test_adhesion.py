@@ -23,7 +23,8 @@ from gelslim_twin.effects.adhesion import (
 )
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound
-from gelslim_twin.planning.question import bundle_figures, motion_figures, plan_scene
+from gelslim_twin.planning.question import motion_figures, plan_scene
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.indenter import FlatPunch, Indenter, Sphere
 from gelslim_twin.scene.pose import Pose

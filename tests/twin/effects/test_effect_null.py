@@ -17,7 +17,8 @@ from sim_rig import small_sensor
 
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.planning.question import bundle_figures, plan_scene
+from gelslim_twin.planning.question import plan_scene
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
@@ -133,7 +134,7 @@ import sys
 from pathlib import Path
 from gelslim_twin.planning.question import plan_scene
 from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.planning.question import bundle_figures
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.effects.registry import EFFECTS

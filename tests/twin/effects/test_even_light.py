@@ -31,7 +31,7 @@ from gelslim_twin.effects.dot_contrast import (
 from gelslim_twin.effects.grey_values import ONE_SIDE
 from gelslim_twin.effects.image_noise import SensorNoiseParameters, sensor_noise_bound
 from gelslim_twin.effects.relief import DirtParameters, grey_share
-from gelslim_twin.planning.question import bundle_figures
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.render.light_change import changed_share
 from gelslim_twin.simulation.picture import Viewer
 

@@ -13,7 +13,8 @@ from gelslim_cad.geometry.optics import camera_record
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.effects.dot_positions import LENS_DISTORTION, REFRACTION
-from gelslim_twin.planning.question import figures, plan_scene, question
+from gelslim_twin.planning.question import plan_scene, question
+from gelslim_twin.planning.sensor_figures import figures
 from gelslim_twin.render.look import plan_camera, plan_look, refracting
 
 LENS = {"k1": -0.12, "k2": 0.03, "p1": 0.001, "p2": -0.002, "k3": 0.0}

@@ -82,7 +82,8 @@ RUN = """
 import sys
 from pathlib import Path
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import TwinSensor

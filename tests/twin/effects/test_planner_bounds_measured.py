@@ -10,7 +10,8 @@ from sim_rig import small_sensor, written_scene
 
 from gelslim_twin.effects.effect import OBSERVABLES
 from gelslim_twin.planning.planner import make_plan
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import TwinSensor

@@ -22,7 +22,8 @@ from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.effects.circumstances import Circumstances, MotionFigures
 from gelslim_twin.effects.effect import Bound
 from gelslim_twin.effects.skin import SKIN, skin_bound
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.indenter import FlatPunch, Indenter, Sphere, TexturedPlane
 from gelslim_twin.scene.pose import Pose

@@ -16,7 +16,8 @@ from gelslim.contacts import twin_key
 from gelslim_core.budget.budget import Budget, BudgetError
 from gelslim_core.budget.machine_times import write_times
 from gelslim_twin.planning.planner import make_plan
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.planning.tolerance_ladder import (
     GEL,
     LARGE_STRAIN,

@@ -28,7 +28,8 @@ from gelslim_twin.effects.viscoelasticity import (
     viscoelasticity_bound,
     viscoelasticity_ladder,
 )
-from gelslim_twin.planning.question import bundle_figures, motion_figures, plan_scene
+from gelslim_twin.planning.question import motion_figures, plan_scene
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.indenter import FlatPunch, Indenter, Sphere
 from gelslim_twin.scene.pose import Pose

@@ -28,7 +28,8 @@ from gelslim_twin.planning.probed_path import (
     probed_poses,
 )
 from gelslim_twin.planning.probing import MOST_SHARE, PAYING_SHARE, effects_to_probe
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.probe import probed

@@ -14,7 +14,8 @@ from sim_rig import SCENE, small_sensor
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning import planner
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.scene.scene import Effects
 from gelslim_twin.simulation.picture import Viewer
