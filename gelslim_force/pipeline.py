@@ -7,6 +7,7 @@ the markers, drift and forces. What is wrong with a frame is reported in its res
 from __future__ import annotations
 
 import copy
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,10 @@ from gelslim_force.forces import frame_problems
 from gelslim_force.forces.contact_motion import ContactMotion
 from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.forces.frame_problems import FrameCheck
-from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.forces.gel_law import GelLaw
-from gelslim_force.forces.untouched import untouched, with_untouched
-from gelslim_force.forces.wrench import WrenchNoise
+from gelslim_force.forces.untouched import with_untouched
+from gelslim_force.forces.wrench import Wrench, WrenchNoise
 from gelslim_force.forces.wrench_covariance import WrenchCovariance
 from gelslim_force.frames.frame import Frame, FrameTimes
 from gelslim_force.frames.upright import upright
@@ -206,17 +207,11 @@ class ForcePipeline:
             return self._numbered(times, problems=(str(error),))
         clock.stage("track")
         problems, tracks = tracked.problems, tracked.tracks
-        problem = self._check.refusal(tracked)
-        if problem:
-            self._tracker.undo()
-        else:
-            noise = self._noise_px(tracks)
-            drift = self._drift.update(tracks, noise)
-            problem = drift.problem or self._check.moved(tracks)
+        refused, noise, drift = self._drifted(tracked)
         clock.stage("drift")
-        if problem:
-            problems = (*problems, problem)
-            return self._numbered(times, tracks=tracks, stage_ms=clock.stages, problems=problems)
+        numbered = partial(self._numbered, times, tracks=tracks, stage_ms=clock.stages)
+        if drift is None:
+            return numbered(problems=(*problems, refused))
         size = len(self.points_mm)
         given = None if normal_mm is None else NormalReading.given(size, normal_mm, normal_sigma_mm)
         reading, motion = self._contact.of(image, drift.positions_px, tracks.tracked, given, clock)
@@ -224,37 +219,21 @@ class ForcePipeline:
         if reading is not None and not reading.known:
             problems = (*problems, reading.problem)
         try:
-            found = self._forces_of(motion, tracks.tracked, reading, noise, drift, clock)
+            field, wrench = self._forces_of(motion, tracks.tracked, reading, noise, drift, clock)
         except IfemError as error:
-            problems = (*problems, str(error))
-            return self._numbered(times, tracks=tracks, stage_ms=clock.stages, problems=problems)
-        field = found["field"]
-        if untouched(reading, self._check.unseen.thickness_mm):
-            found["wrench"] = with_untouched(found["wrench"])
-        if self.gel is not None:
-            found["wrench"] = self.gel.added(
-                found["wrench"], field.displacement_mm, reading, field.by_linear_law
-            )
+            return numbered(problems=(*problems, str(error)))
         if self._motion.moved(motion):
             problems = (*problems, *frame_problems.misfit_problem(field.misfit))
         known = reading is not None and reading.known
-        seen = {} if reading is None else {"normal": reading.summary()}
         self._last_force = field.force_n if known else None
         self._drift.rezero(drift, self._index if times.time_s is None else times.time_s)
-        return self._numbered(
-            times,
-            tracks=tracks,
+        return numbered(
             marker_displacement_mm=motion,
+            field=field,
+            wrench=self._with_gel(wrench, field, reading),
             normal_known=known,
-            stage_ms=clock.stages,
             problems=problems,
-            extra={
-                **seen,
-                **field.summary(),
-                "gel": self.gel_law.at(field.displacement_mm, field.by_linear_law),
-                **self._drift.findings(drift),
-            },
-            **found,
+            extra=self._remarks(reading, field, drift),
         )
 
     @single_threaded
@@ -297,6 +276,35 @@ class ForcePipeline:
             raise ValueError(problem)
         return image, self._check.whole.of(self._tracker.update(image))
 
+    def _drifted(self, tracked: TrackedFrame) -> tuple[str, float, FrameDrift | None]:
+        """Why a frame gives no forces, noise of its markers in px, and drift; None if refused."""
+        refusal = self._check.refusal(tracked)
+        if refusal:
+            self._tracker.undo()
+            return refusal, 0.0, None
+        noise = self._noise_px(tracked.tracks)
+        drift = self._drift.update(tracked.tracks, noise)
+        refusal = drift.problem or self._check.moved(tracked.tracks)
+        return refusal, noise, None if refusal else drift
+
+    def _with_gel(self, wrench: Wrench, field: ForceField, reading: NormalReading | None) -> Wrench:
+        """The wrench with what is not known of the gel in its covariance."""
+        wrench = with_untouched(wrench, reading, self._check.unseen.thickness_mm)
+        if self.gel is None:
+            return wrench
+        return self.gel.added(wrench, field.displacement_mm, reading, field.by_linear_law)
+
+    def _remarks(
+        self, reading: NormalReading | None, field: ForceField, drift: FrameDrift
+    ) -> dict[str, Any]:
+        """What a result says beside its forces."""
+        return {
+            **({} if reading is None else {"normal": reading.summary()}),
+            **field.summary(),
+            "gel": self.gel_law.at(field.displacement_mm, field.by_linear_law),
+            **self._drift.findings(drift),
+        }
+
     def _numbered(self, times: FrameTimes, **found: Any) -> FrameResult:
         index, self._index = self._index, self._index + 1
         time_s = float(index) if times.time_s is None else times.time_s
@@ -316,7 +324,7 @@ class ForcePipeline:
         noise: float,
         drift: FrameDrift,
         clock: FrameClock,
-    ) -> dict[str, Any]:
+    ) -> tuple[ForceField, Wrench]:
         """Force field and wrench for a motion (n, 3) of the markers. Raises IfemError."""
         if reading is not None and reading.known and reading.forces is not None:
             forces = reading.forces
@@ -328,7 +336,7 @@ class ForcePipeline:
                 reading.touched,
                 by_linear_law=forces.by_linear_law,
             )
-            return {"field": field, "wrench": wrench}
+            return field, wrench
         noise_mm = noise * self._motion.view.usual_mm_per_px
         filled = self._check.unseen.filled(motion, tracked, noise_mm)
         interpolation, displacement = self._motion.of_nodes(filled.motion_mm, reading)
@@ -339,4 +347,4 @@ class ForcePipeline:
         covariance = self._covariance.of_motion(interpolation, filled, noise, reading, drift)
         wrench = self._wrench.wrench(field.force_n, covariance)
         clock.stage("wrench")
-        return {"field": field, "wrench": wrench}
+        return field, wrench
