@@ -9,6 +9,7 @@ from gelslim_cad.dimensions.cable import LEAST_PLUG_MM, LEAST_ROOF_MM, OVER_COVE
 from gelslim_cad.dimensions.fold.housing import CHANNEL_WALL_MM, LEAST_FLOOR_MM
 from gelslim_cad.dimensions.housing import TONGUE_LEAST_MM
 from gelslim_cad.dimensions.registry import Real
+from gelslim_cad.dimensions.seat import CABLE_GAP_MM
 from gelslim_cad.geometry.fasteners import SCREWS
 
 OUTSIDE_MM = 10.0
@@ -175,6 +176,24 @@ def cable_floor(clamp_base_mm: Real, camera_cable_exit: str) -> Finding:
     """Thickness of the floor under the module; the limit, where it joins nothing."""
     floor = np.where(camera_cable_exit == "bottom", clamp_base_mm, LEAST_FLOOR_MM)[()]
     return Finding(floor, LEAST_FLOOR_MM, least=True)
+
+
+@rule(
+    "cable.depth_mm",
+    title="Cable at an edge of the module is thinner than the module is deep",
+    parameter="camera.cable_exit",
+    why="at the top or bottom the cable leaves in the plane of the module's rear face; at the "
+    "bottom it parts the clamp, of whose floor 1 mm must join the cheeks before the cable",
+    advice="turn the module so that its cable leaves behind (rear), or use a flat or thinner cable "
+    "or a deeper module (camera.module_depth_mm)",
+)
+def cable_depth(
+    cable_thickness_mm: Real, camera_module_depth_mm: Real, camera_cable_exit: str
+) -> Finding:
+    """Depth that cable and floor take of the module's; none, where the cable leaves behind."""
+    floor = np.where(camera_cable_exit == "bottom", CABLE_GAP_MM + LEAST_FLOOR_MM, 0.0)
+    taken = np.where(camera_cable_exit == "rear", 0.0, cable_thickness_mm + floor)[()]
+    return Finding(taken, camera_module_depth_mm)
 
 
 @rule(

@@ -90,6 +90,7 @@ RuleId = Literal[
     "cable.cover_mm",
     "cable.roof_mm",
     "cable.floor_mm",
+    "cable.depth_mm",
     "cable.length_mm",
     "cable.hold_n",
     "wire.channel_mm",

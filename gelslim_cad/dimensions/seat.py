@@ -37,6 +37,8 @@ LEAST_LIP_MM = 0.4
 LEAST_SPAN_MM = 2.0
 LEAST_BASE_MM = 1.0
 LEAST_DEPTH_MM = 2.5
+CABLE_GAP_MM = 0.3
+"""From the cable to the clamp, where the cable lies behind or under the module."""
 
 
 @dimension("clamp.lip_mm", formula="min(1.2, lens height - play - 0.2)")

@@ -20,7 +20,7 @@ import cadquery as cq
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.dimensions.fold.housing import CLAMP_BAR_MM
 from gelslim_cad.dimensions.housing import CLAMP_CHEEK_MM
-from gelslim_cad.dimensions.seat import LEAST_LIP_MM, POINT_MM
+from gelslim_cad.dimensions.seat import CABLE_GAP_MM, LEAST_LIP_MM, POINT_MM
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.camera import placed
 from gelslim_cad.solids.layout import Layout
@@ -41,7 +41,6 @@ FAR_MM = 200.0
 SCREW_DEPTH_MM = 5.0
 LEAST_FLOOR_MM = 0.8
 """Thinner floors of the clamp are left out: there the cover is the floor."""
-CABLE_GAP_MM = 0.3
 NUB_MM = 0.6
 """From a leaf spring to the module."""
 SPRING_GAP_MM = 1.0
@@ -147,11 +146,8 @@ def _clamp(d: Dimensions, forward_mm: float) -> cq.Solid:
     pieces += _seat(d, f, forward_mm) if d["clamp.preloaded"] > 0 else _bar(f)
     floor = box((f.back, f.face), (-f.outer, f.outer), (f.floor - 0.1, f.floor))
     floored = placed(d, floor).BoundingBox().zmin - d["cover.top_z_mm"] > LEAST_FLOOR_MM
-    if d["camera.cable_exit"] == "bottom" and not floored:
-        raise SolidError(
-            "camera_clamp is parted by the cable, which leaves at the bottom, and has no room for "
-            "a floor under the module (rule cable.floor_mm)"
-        )
+    if d["camera.cable_exit"] == "bottom":
+        _joined_before_cable(d, f, floored)
     if floored:
         pieces.append(box((f.back, f.face), (-f.outer, f.outer), (-FAR_MM, f.floor)))
     whole = subtract(union(pieces), [_passage(d, f)])
@@ -167,6 +163,15 @@ def _clamp(d: Dimensions, forward_mm: float) -> cq.Solid:
     ]
     cradle = placed(d, whole).intersect(slab)
     return single(subtract(cradle, holes), "camera_clamp")
+
+
+def _joined_before_cable(d: Dimensions, f: _Frame, floored: bool) -> None:
+    """Raise SolidError where no floor joins the halves before a cable at the bottom."""
+    parted = "camera_clamp is parted by the cable, which leaves at the bottom, and has no room for "
+    if not floored:
+        raise SolidError(f"{parted}a floor under the module (rule cable.floor_mm)")
+    if f.face - f.rear <= d["cable.thickness_mm"] + CABLE_GAP_MM:
+        raise SolidError(f"{parted}a floor before so thick a cable (rule cable.depth_mm)")
 
 
 def _lips(f: _Frame) -> list[cq.Shape]:

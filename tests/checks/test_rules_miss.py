@@ -208,6 +208,11 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
     "cable.floor_mm": [
         ({"camera.cable_exit": "bottom", "=clamp.base_mm": 0.4}, "fail"),
     ],
+    "cable.depth_mm": [
+        ({"camera.cable_exit": "bottom", "camera.module_depth_mm": 2.5,
+          "=cable.thickness_mm": 1.21}, "fail"),
+        ({"camera.cable_exit": "top", "camera.cable_kind": "round"}, "fail"),
+    ],
     "cable.length_mm": [({"camera.cable_length_mm": 35.0}, "fail")],
     "cable.hold_n": [({"camera.cable_width_mm": 3.0}, "warn")],
     "wire.channel_mm": [({"design.leds.wire_diameter_mm": 2.8}, "fail")],

@@ -145,6 +145,42 @@ def test_a_clamp_with_the_least_floor_is_one_solid(
     assert (clamp.printed is not None) == (seat == "preloaded")
 
 
+@pytest.mark.parametrize("seat", ["loose", "preloaded"])
+@pytest.mark.parametrize("kind", ["round", "flat"])
+def test_a_clamp_before_the_thickest_cable_is_one_solid(seat: str, kind: str) -> None:
+    """The floor is left 1 mm before the cable; a cable as thick as the module leaves none."""
+    size = "camera__cable_width_mm" if kind == "round" else "camera__cable_thickness_mm"
+    cable = {
+        "design__housing__camera_seat": seat,
+        "camera__cable_exit": "bottom",
+        "camera__cable_kind": kind,
+        "camera__cable_bend_radius_mm": 0.5,
+    }
+    depth = changed("mini20")["camera.module_depth_mm"]
+    least = changed("mini20", **cable, **{size: depth - 1.3})
+    assert check(least).of("cable.depth_mm").status == "pass"
+    clamp = camera_clamp(least)
+    assert clamp.solid.isValid()
+    assert (clamp.printed is not None) == (seat == "preloaded")
+    parted = changed("mini20", **cable, **{size: depth})
+    rule = check(parted).of("cable.depth_mm")
+    assert rule.status == "fail"
+    assert (rule.value, rule.limit) == (pytest.approx(depth + 1.3), depth)
+    with pytest.raises(SolidError, match=r"camera_clamp .* cable\.depth_mm"):
+        camera_clamp(parted)
+
+
+@pytest.mark.parametrize(("exit_side", "status"), [("top", "fail"), ("rear", "pass")])
+def test_a_cable_thicker_than_its_module_leaves_only_behind(exit_side: str, status: str) -> None:
+    d = changed(
+        "mini20",
+        camera__cable_exit=exit_side,
+        camera__cable_kind="round",
+        camera__cable_width_mm=4.5,
+    )
+    assert check(d).of("cable.depth_mm").status == status
+
+
 @each_finger
 def test_led_boards_touch_their_edges_and_crush_their_ribs(name: str) -> None:
     """Pushed out by 1 µm a board overlaps the edges; it overlaps the ribs as printed."""
