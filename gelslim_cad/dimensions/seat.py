@@ -37,6 +37,8 @@ LEAST_LIP_MM = 0.4
 LEAST_SPAN_MM = 2.0
 LEAST_BASE_MM = 1.0
 LEAST_DEPTH_MM = 2.5
+LEAST_PRESSED_MM = 0.04
+"""Of the module's rear face beside the cable and its gap, for a spring to meet it at all."""
 CABLE_GAP_MM = 0.3
 """From the cable to the clamp, where the cable lies behind or under the module."""
 
@@ -176,8 +178,18 @@ def clamp_preloaded(
     clamp_spring_mm: Real,
     clamp_spring_width_mm: Real,
     clamp_base_mm: Real,
+    camera_cable_width_mm: Real,
+    camera_cable_exit: str,
+    housing_fit_clearance_mm: Real,
 ) -> Real:
-    """Whether springs press the camera against three points."""
+    """Whether springs press the camera against three points.
+
+    A cable comes down between the springs, which meet the rear face beside it. One that leaves at
+    the top stays above them, and is as wide as the module at most.
+    """
+    beside_cable = (camera_module_width_mm - camera_cable_width_mm) / 2
+    least = housing_fit_clearance_mm + LEAST_PRESSED_MM
+    pressed = np.where(camera_cable_exit == "top", 0.0, least)
     beside = camera_module_width_mm / 2 - camera_lens_diameter_mm / 2 - clamp_play_mm
     room = (
         (housing_camera_seat == "preloaded")
@@ -187,6 +199,7 @@ def clamp_preloaded(
         & (camera_module_depth_mm >= LEAST_DEPTH_MM)
         & (clamp_spring_mm >= LEAST_SPRING_MM)
         & (clamp_spring_width_mm >= POINT_MM)
+        & (beside_cable >= pressed)
         & (clamp_base_mm >= LEAST_BASE_MM)
     )
     return np.where(room, 1.0, 0.0)[()]

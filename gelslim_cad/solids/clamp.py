@@ -150,7 +150,7 @@ def _clamp(d: Dimensions, forward_mm: float) -> cq.Solid:
         _joined_before_cable(d, f, floored)
     if floored:
         pieces.append(box((f.back, f.face), (-f.outer, f.outer), (-FAR_MM, f.floor)))
-    whole = subtract(union(pieces), [_passage(d, f)])
+    whole = subtract(union(pieces), [_passage(d, f, forward_mm)])
     slab = box(
         (-FAR_MM, FAR_MM),
         (-FAR_MM, FAR_MM),
@@ -194,11 +194,11 @@ def _bar(f: _Frame) -> list[cq.Shape]:
     ]
 
 
-def _passage(d: Dimensions, f: _Frame) -> cq.Shape:
+def _passage(d: Dimensions, f: _Frame, forward_mm: float) -> cq.Shape:
     """Free space of the cable behind the module, open upwards."""
-    low, front = -FAR_MM, f.rear + d["cable.thickness_mm"] + CABLE_GAP_MM
+    low, front = -FAR_MM, f.rear + max(d["cable.thickness_mm"] + CABLE_GAP_MM, forward_mm)
     if d["camera.cable_exit"] == "rear":
-        low, front = -d["cable.thickness_mm"] / 2 - CABLE_GAP_MM, f.rear
+        low, front = -d["cable.thickness_mm"] / 2 - CABLE_GAP_MM, f.rear + forward_mm
     elif d["camera.cable_exit"] == "top":
         low = f.half_height - CABLE_GAP_MM
     return box((-FAR_MM, front), (-f.cable, f.cable), (low, FAR_MM))
@@ -254,11 +254,12 @@ def _springs(d: Dimensions, f: _Frame, forward_mm: float) -> list[cq.Shape]:
     inner = f.outer - d["clamp.spring_width_mm"]
     touch, root = f.rear + forward_mm, front - OVERLAP_MM
     height = f.half_height / 2
+    end = max(f.half_width, inner) + NUB_MM
     wedge = [
         (root, f.half_width - NUB_MM - OVERLAP_MM - forward_mm),
         (touch + NUB_MM / 2, f.half_width + NUB_MM / 2),
-        (touch + NUB_MM / 2, f.half_width + NUB_MM),
-        (root, f.half_width + NUB_MM),
+        (touch + NUB_MM / 2, end),
+        (root, end),
     ]
     flat = [(root, -f.outer), (touch, -f.outer), (touch, POINT_MM - f.half_width)]
     flat.append((root, POINT_MM - f.half_width))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cadquery as cq
 import numpy as np
 import pytest
 from finger_samples import each_finger, finger, part
@@ -12,8 +13,10 @@ from shipped_fingers import DESIGNS
 
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
-from gelslim_cad.dimensions.seat import LEAST_PRELOAD_MM, MODULUS_MPA, STRAIN
+from gelslim_cad.dimensions.seat import LEAST_PRELOAD_MM, MODULUS_MPA, POINT_MM, STRAIN
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.proof.solids import common_volume
+from gelslim_cad.solids.camera import camera
 from gelslim_cad.solids.clamp import camera_clamp
 from gelslim_cad.solids.led_seat import uncrushed_ribs
 from gelslim_cad.solids.shapes import SolidError
@@ -33,13 +36,22 @@ def test_the_printed_springs_reach_into_the_camera_by_their_deflection(name: str
     if not d["clamp.preloaded"]:
         assert part(name, "camera_clamp").printed is None
         return
-    clamp, camera = part(name, "camera_clamp"), part(name, "camera").solid
-    assert common_volume(clamp.solid, camera) < 1e-6
+    assert_springs_press(d, part(name, "camera_clamp"), part(name, "camera").solid)
+
+
+def assert_springs_press(d: Dimensions, clamp: Part, module: cq.Shape) -> None:
+    """In place the clamp touches the camera; as printed its two nubs reach into it.
+
+    The wider one meets the rear face by a point, or by what the cable leaves beside it.
+    """
+    assert common_volume(clamp.solid, module) < 1e-6
     printed = clamp.printed
     assert printed is not None
     assert printed.isValid()
-    common = printed.intersect(camera)
+    common = printed.intersect(module)
     assert len(common.Solids()) == 2
+    across = max(solid.BoundingBox().ylen for solid in common.Solids())
+    assert across == pytest.approx(pressed_mm(d), abs=1e-6)
     pitch = np.radians(d["camera_pose.pitch_deg"])
     forward = np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
     rear = -d["camera_pose.face_mm"] - d["camera.module_depth_mm"]
@@ -50,6 +62,26 @@ def test_the_printed_springs_reach_into_the_camera_by_their_deflection(name: str
     ]
     # The flat nub reaches in by the deflection, the wedge at the rear edge by as much.
     assert ahead == pytest.approx([d["clamp.spring_deflection_mm"]] * 2, abs=1e-6)
+
+
+def pressed_mm(d: Dimensions) -> float:
+    """Width of the rear face that the flat nub meets."""
+    if d["camera.cable_exit"] == "top":
+        return POINT_MM
+    gap = d["camera.module_width_mm"] - d["camera.cable_width_mm"]
+    return min(POINT_MM, gap / 2 - d["design.housing.fit_clearance_mm"])
+
+
+@pytest.mark.parametrize(
+    ("exit_side", "width_mm"),
+    [("bottom", 7.9), ("top", 8.5), ("rear", 7.9), ("bottom", 6.2)],
+    ids=["wide at the bottom", "as wide as the module", "wide behind", "between the springs"],
+)
+def test_springs_press_beside_a_wide_cable(exit_side: str, width_mm: float) -> None:
+    """At the top it may be as wide as the module, which it leaves above the springs."""
+    d = changed("mini20", camera__cable_exit=exit_side, camera__cable_width_mm=width_mm)
+    assert d["clamp.preloaded"] == 1
+    assert_springs_press(d, camera_clamp(d), camera(d).solid)
 
 
 @pytest.mark.parametrize("process", ["sla", "fdm", "sls"])
@@ -83,8 +115,15 @@ def test_spring_formulas_are_those_of_an_integrated_beam(process: str) -> None:
         {"camera__lens_diameter_mm": 8.0},
         {"camera__module_depth_mm": 2.0},
         {"manufacturing__print_tolerance_mm": 0.6},
+        {"camera__cable_width_mm": 8.5},
+        {"camera__cable_width_mm": 10.0},
+        {"camera__cable_width_mm": 8.5, "camera__cable_exit": "rear"},
+        {"camera__cable_width_mm": 9.0, "camera__cable_exit": "top"},
     ],
-    ids=["loose", "no lips", "wide lens", "shallow", "coarse print"],
+    ids=[
+        *("loose", "no lips", "wide lens", "shallow", "coarse print"),
+        *("wide cable", "cable beyond the springs", "wide cable behind", "wide cable on top"),
+    ],
 )
 def test_a_camera_without_room_for_the_seat_lies_loose(changes: dict[str, object]) -> None:
     d = changed("mini20", **changes)
