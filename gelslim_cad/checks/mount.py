@@ -274,7 +274,10 @@ def clamp_tilt(clamp_tilt_deg: Real, housing_camera_seat: str, clamp_preloaded: 
 
     def why() -> str:
         wanted = housing_camera_seat == "preloaded" and not clamp_preloaded
-        springs = "the module has no room for lips, points and springs, so that it lies loose; "
+        springs = (
+            "the module has no room for lips, points and springs beside its cable, so that it lies "
+            "loose; "
+        )
         return (springs if wanted else "") + f"it can tilt by {clamp_tilt_deg:.2f}°"
 
     return Finding(clamp_tilt_deg, MOST_TILT_DEG, advisory=True, reason=why)
