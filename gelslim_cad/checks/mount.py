@@ -16,6 +16,8 @@ OUTSIDE_MM = 10.0
 LONGEST_MM = 5000.0
 """Longest cable that a spec may give, for one whose length is not given."""
 LEAST_HOLD_N = 1.0
+LEAST_CEILING_MM = 0.6
+"""Over a cable that bends above the camera."""
 MOST_TILT_DEG = 1.5
 LEAST_PRELOAD_N = 0.2
 
@@ -163,6 +165,45 @@ def cable_roof(
     """Plastic between the groove's roof and the outside."""
     top = np.maximum(cable_level_z_mm + cable_thickness_mm / 2, wire_lane_top_z_mm)
     return Finding(-housing_gel_proud_mm - top, LEAST_ROOF_MM, least=True)
+
+
+@rule(
+    "cable.window_mm",
+    title="Cable's bend above the camera stays under bezel, window and shims",
+    parameter="camera.cable_bend_radius_mm",
+    why="a cable that leaves at the top turns over the camera, and 0.6 mm of plastic part it from "
+    "what lies above",
+    advice="use a thinner or more flexible cable, or turn the module so that its cable leaves at "
+    "another side (camera.cable_exit)",
+)
+def cable_window(
+    cable_level_z_mm: Real,
+    cable_bend_end_x_mm: Real,
+    cable_radius_mm: Real,
+    cable_thickness_mm: Real,
+    camera_cable_exit: str,
+    bezel_proximal_x_mm: Real,
+    guide_proximal_end_x_mm: Real,
+    housing_fit_clearance_mm: Real,
+    stack_gel_bottom_z_mm: Real,
+    stack_window_bottom_z_mm: Real,
+    shim_compressed_mm: Real,
+) -> Finding:
+    """Least gap over the bend's outer side; the limit, where it reaches under neither."""
+    outer = cable_radius_mm + cable_thickness_mm / 2
+    bezel = bezel_proximal_x_mm - cable_bend_end_x_mm
+    window = guide_proximal_end_x_mm - housing_fit_clearance_mm - cable_bend_end_x_mm
+
+    def over(ahead_mm: Real, ceiling_z_mm: Real) -> Real:
+        rise = np.sqrt(np.maximum(outer**2 - np.maximum(ahead_mm, 0.0) ** 2, 0.0))
+        gap = ceiling_z_mm - (cable_level_z_mm - cable_radius_mm + rise)
+        turned = (camera_cable_exit == "top") & (ahead_mm < outer)
+        return np.where(turned, gap, LEAST_CEILING_MM)
+
+    shims = over(window, stack_window_bottom_z_mm - shim_compressed_mm)
+    return Finding(
+        np.minimum(over(bezel, stack_gel_bottom_z_mm), shims)[()], LEAST_CEILING_MM, least=True
+    )
 
 
 @rule(

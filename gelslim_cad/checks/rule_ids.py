@@ -89,6 +89,7 @@ RuleId = Literal[
     "cable.slot_mm",
     "cable.cover_mm",
     "cable.roof_mm",
+    "cable.window_mm",
     "cable.floor_mm",
     "cable.depth_mm",
     "cable.length_mm",

@@ -206,3 +206,24 @@ def test_the_floor_under_a_pitched_camera(pitch_deg: float) -> None:
     assert base == pytest.approx(10.0 + min(front.imag, rear.imag))
     assert cable_floor(base, "bottom").value == base
     assert cable_floor(0.2, "rear").value >= cable_floor(0.2, "rear").limit
+
+
+@pytest.mark.parametrize("bend_end_x_mm", [-24.0, -21.4, -15.0])
+def test_the_gap_over_a_bend_above_the_camera(bend_end_x_mm: float) -> None:
+    """Least gap under bezel and window over points of the bend's outer side."""
+    from gelslim_cad.checks.mount import LEAST_CEILING_MM, cable_window
+
+    level, radius, thick = -6.5, 5.5, 4.0
+    turn = np.linspace(0.0, np.pi / 2, 200_001)
+    x = bend_end_x_mm + (radius + thick / 2) * np.sin(turn)
+    z = level - radius + (radius + thick / 2) * np.cos(turn)
+    x = np.append(x, np.linspace(bend_end_x_mm - 50.0, bend_end_x_mm, 50_001))
+    z = np.append(z, np.full(50_001, level + thick / 2))
+    gaps = [-2.3 - z[x >= -26.3].max(), -4.8 - 0.7 - z[x >= -20.0].max()]
+    place = (-26.3, -19.8, 0.2, -2.3, -4.8, 0.7)
+    found = cable_window(level, bend_end_x_mm, radius, thick, "top", *place)
+    assert found.value == pytest.approx(min(gaps), abs=1e-3)
+    assert cable_window(level, -40.0, radius, thick, "top", *place).value == LEAST_CEILING_MM
+    assert cable_window(level, bend_end_x_mm, radius, thick, "rear", *place).value == (
+        LEAST_CEILING_MM
+    )

@@ -205,6 +205,12 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"=cable.level_z_mm": -1.2}, "fail"),
         ({"=wire.lane_top_z_mm": -1.5}, "fail"),
     ],
+    "cable.window_mm": [
+        ({"camera.cable_exit": "top", "=cable.level_z_mm": -2.0, "=cable.bend_end_x_mm": -17.0},
+         "fail"),
+        ({"camera.cable_exit": "top", "=cable.level_z_mm": -4.0, "=cable.bend_end_x_mm": -11.5},
+         "fail"),
+    ],
     "cable.floor_mm": [
         ({"camera.cable_exit": "bottom", "=clamp.base_mm": 0.4}, "fail"),
     ],
