@@ -10,6 +10,8 @@ import numpy as np
 from .ranges import LEAVES, TEXTS, Leaf, anywhere, short
 
 RESOLUTIONS = ((320, 240), (640, 480), (800, 600), (1280, 720), (1600, 1200), (640, 640))
+CABLE_RATIO = 0.6
+"""Thickest round cable at an edge of the module over the module's depth, for most depths drawn."""
 Values = dict[str, Any]
 
 
@@ -35,7 +37,11 @@ def plausible(rng: np.random.Generator) -> Values:
     values: Values = {
         path: near_default(rng, leaf) for path, leaf in LEAVES.items() if not leaf.required
     }
-    return values | _camera(rng) | _gel(rng) | _housing(rng, values) | _boards(rng)
+    values |= _camera(rng) | _gel(rng) | _housing(rng, values) | _boards(rng)
+    if values["camera.cable_kind"] == "round" and values["camera.cable_exit"] != "rear":
+        most = CABLE_RATIO * values["camera.module_depth_mm"]
+        values["camera.cable_width_mm"] = short(min(values["camera.cable_width_mm"], most), 3)
+    return values
 
 
 def _boards(rng: np.random.Generator) -> Values:

@@ -18,10 +18,14 @@ import pytest
 
 from . import campaign
 from .campaign import Filed, run_many, summary
-from .case import Outcome, Stage
+from .case import Outcome, Stage, run_case
 from .legal_specs import KINDS, sample
 
 SEED = 20
+MOST_SOUGHT = 60
+LEAST_SHARE = 1 / 6
+"""Of the specs that keep the rules; rarer ones would make the campaign a test of the rules alone.
+A third of the first 260 of this seed did, and of 60 a sixth is three standard deviations below."""
 linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs fork")
 
 
@@ -104,18 +108,37 @@ def _campaign(tmp_path: Path, *arguments: str) -> dict[str, Any]:
     return counted
 
 
+def _first_of(folder: Path, count: int, legal: int) -> int:
+    """Index of the first specs in a row of which so many keep the rules of a finger."""
+    kept: list[bool] = []
+    for index in range(MOST_SOUGHT):
+        path = folder / f"sought{index}.yaml"
+        path.write_text(sample(SEED, index).text, encoding="utf-8")
+        kept.append(run_case(path, "rules", lambda stage: None).status == "built")
+        if len(kept) >= count and sum(kept[-count:]) == legal:
+            return index + 1 - count
+    raise AssertionError(f"no {count} specs in a row of which {legal} keep the rules")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("first", "count", "built"), [(0, 3, 1), (0, 10, 2)])
-def test_small_campaign(tmp_path: Path, first: int, count: int, built: int) -> None:
-    """The three of the short one hold one that is built and two that are refused."""
+@pytest.mark.parametrize(("count", "legal"), [(3, 1), (10, 2)])
+def test_small_campaign(tmp_path: Path, count: int, legal: int) -> None:
+    """So many specs keep the rules and are built, the others are refused.
+
+    Where they begin is sought, because every new field of the spec moves all that is drawn: the
+    same numbers of the sequence might hold none that is built, or more than there is time for.
+    """
+    first = _first_of(tmp_path, count, legal)
     counted = _campaign(tmp_path, "--first", str(first), "--count", str(count))
     assert counted["specs"] == count
     assert counted["failed"] == counted["refused_on_the_solids"] == 0, campaign.shown(counted)
-    assert counted["built_and_proved"] >= built
-    assert counted["built_and_proved"] + counted["refused_with_a_reason"] == count
+    assert counted["built_and_proved"] == legal
+    assert counted["refused_with_a_reason"] == count - legal
 
 
 @pytest.mark.slow
 def test_many_specs_meet_the_rules(tmp_path: Path) -> None:
+    """None fails, and a good share would reach CAD."""
     counted = _campaign(tmp_path, "--count", "60", "--first", "100", "--stage", "rules")
     assert counted["failed"] == 0, campaign.shown(counted)
+    assert counted["built_and_proved"] >= LEAST_SHARE * 60, campaign.shown(counted)
