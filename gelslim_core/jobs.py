@@ -297,6 +297,12 @@ def _unraisable(before: Callable[[Any], Any]) -> Callable[[Any], None]:
     return swallowed
 
 
+def _uncaught(kind: type[BaseException], value: BaseException, trace: Any) -> None:
+    # Compiled code prints an exception before it swallows it.
+    if not isinstance(value, _Terminated):
+        sys.__excepthook__(kind, value, trace)
+
+
 def begin_worker() -> None:
     """Make this process end with its parent, and ignore Ctrl-C.
 
@@ -307,6 +313,7 @@ def begin_worker() -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, _terminate)
         sys.unraisablehook = _unraisable(sys.unraisablehook)
+        sys.excepthook = _uncaught
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     parent = multiprocessing.parent_process()

@@ -19,6 +19,7 @@ from scipy.ndimage import binary_dilation
 from gelslim_core.errors import GelslimError
 from gelslim_force.contact.light_baseline import without_baseline
 from gelslim_force.contact.noise_grain import noise_grain
+from gelslim_force.contact.noise_law import NoiseLaw
 from gelslim_force.contact.reflections import reflecting
 from gelslim_force.frames.read_only import read_only
 
@@ -130,7 +131,7 @@ class ShadingReference:
             raise ValueError(
                 f"the reference picture is dark (mean {level.max():.0f} of 255) and has no shading"
             )
-        self._noise_level = _noise_level(levels[self.used])
+        self._noise = NoiseLaw.of(levels[self.used] + np.float32(FLOOR))
         free = np.maximum(np.arange(bin_px**2 + 1), 1)
         self._by_free = np.sqrt(bin_px**2 / free).astype(np.float32)
 
@@ -189,9 +190,12 @@ class ShadingReference:
             self.image, picture, mask, glaring, self.bin_px, FLOOR, self._ratios, self._counts,
         )  # fmt: skip
         free = (self._counts >= LEAST_FREE * self.bin_px**2) & ~self._soiled()
-        noise_level = self._noise_level * self._by_free[self._counts]
+        noise_level = self._noise.even * self._by_free[self._counts]
         change, valid = _combined(np.log(self._ratios[self.used])), free & self.on_pad
         noise = without_baseline(change, valid, noise_level)
+        grown = self._noise.growth(change, noise, valid)
+        if grown is not None:
+            noise *= grown
         grain = noise_grain(change, noise, valid, self.bin_px)
         noise *= grain.astype(noise.dtype)[:, None, None]
         hidden = reflecting(change, noise, valid) if self._opposed and len(change) > 1 else None
@@ -260,16 +264,3 @@ def _combined(log: NDArray[np.floating]) -> NDArray[np.floating]:
     out[1] *= 0.5
     np.subtract(log[2:], out[1], out=out[2:])
     return out
-
-
-def _noise_level(levels: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Relative noise of each bin of each layer of `_combined`, up to a factor per layer.
-
-    The noise is taken to be the same at all grey values, because gamma removes most of the shot
-    noise of bright pixels. The error of a logarithm is then proportional to 1 over the level.
-    """
-    square = 1 / np.square(levels + np.float32(FLOOR))
-    if len(square) == 1:
-        return np.sqrt(square)
-    both = square[:1] + square[1:2]
-    return np.sqrt(np.concatenate([both, both / 4, square[2:] + both / 4]))

@@ -395,3 +395,12 @@ def test_a_second_signal_while_a_swallowed_one_is_told_raises_nothing(
     finally:
         signal.signal(signal.SIGTERM, before)
     assert len(repeated) == 2
+
+
+def test_what_compiled_code_prints_before_it_swallows_it_is_not_shown(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Cython calls the hook for uncaught exceptions in functions that return none."""
+    for error in (jobs._Terminated(), ValueError("another")):
+        jobs._uncaught(type(error), error, None)
+    assert capsys.readouterr().err.strip() == "ValueError: another"
