@@ -1,7 +1,7 @@
 """Marker frames to forces: tracking, compensation, interpolation, stiffness, wrench.
 
-Build one `ForcePipeline` per sensor and give it the frames in order. It keeps the last positions of
-the markers, drift and forces. What is wrong with a frame is reported in its result.
+Build one `ForcePipeline` per sensor and give it the frames in order. It keeps what it last found.
+What is wrong with a frame is reported in its result.
 """
 
 from __future__ import annotations
@@ -87,8 +87,7 @@ class ForcePipeline:
         reference = self._tracker.reference
         markers, points_mm = bundle.markers, np.asarray(bundle.mesh.surface_mm)
         operator = self.settings.operator(bundle)
-        adjoint = self.settings.adjoint(bundle, operator)
-        self._wrench = WrenchNoise.of(operator, points_mm, adjoint)
+        self._wrench = WrenchNoise.of(operator, points_mm, self.settings.adjoint(bundle, operator))
         self._motion = SurfaceMotion(
             MarkerView(
                 calibration.camera,
@@ -132,10 +131,7 @@ class ForcePipeline:
         return GelLaw.of(self.bundle, self.settings.gel, depth_seen=self.normal is not None)
 
     def with_normal(self, normal: NormalSource | None) -> ForcePipeline:
-        """A pipeline of the same sensor with another normal source, at rest.
-
-        What was prepared for the sensor is shared, so that this takes no time.
-        """
+        """A pipeline of the sensor with another normal source, at rest; it shares the operators."""
         other = copy.copy(self)
         other.normal, other._tracker = normal, self.calibration.tracker()
         other._contact = ContactMotion(self._motion, self._check.unseen, normal)
@@ -143,6 +139,11 @@ class ForcePipeline:
         other._prepare_edge()
         other.reset()
         return other
+
+    @single_threaded
+    def prepare(self) -> None:
+        """Compute now what the first contact at each place would wait for: some seconds."""
+        self._contact.prepare()
 
     def reset(self) -> None:
         """Forget all motion and count frames from 0."""
@@ -193,8 +194,7 @@ class ForcePipeline:
 
         Raises:
             ValueError: `normal_mm` or `normal_sigma_mm` has another shape or is not finite, a
-                deviation is negative, `time_s` is no finite number, or `stamp_s` is no number of
-                seconds since 1970.
+                deviation is negative, or `time_s` or `stamp_s` is no time.
         """
         clock = FrameClock()
         times = FrameTimes.of(frame, time_s, stamp_s)

@@ -261,6 +261,11 @@ class IndenterSource:
     hidden_n: float = 0.0
     hidden_mm: float = 0.0
 
+    def prepare(self) -> None:
+        """Compute the compliance of the whole pad now, so that no frame waits for it."""
+        for model in (self.model, *(varied for varied, _ in self.varied)):
+            model.prepare()
+
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | str | None:
         """The patch of a frame whose markers are at (n, 2), or why none can be seen."""
         try:

@@ -180,6 +180,14 @@ class NormalSource(Protocol):
 
 
 @runtime_checkable
+class Prepared(Protocol):
+    """A normal source that computes some things when they are first needed."""
+
+    def prepare(self) -> None:
+        """Compute them now, so that no frame waits for them."""
+
+
+@runtime_checkable
 class Remembering(Protocol):
     """A normal source that keeps something from frame to frame."""
 

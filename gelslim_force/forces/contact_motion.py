@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.contact.normal_source import NormalReading, NormalSource, Remembering
+from gelslim_force.contact.normal_source import NormalReading, NormalSource, Prepared, Remembering
 from gelslim_force.forces import frame_problems
 from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.motion.surface_motion import SurfaceMotion
@@ -35,6 +35,11 @@ class ContactMotion:
     ) -> None:
         self._motion, self._unseen, self._normal = motion, unseen, normal
         self._last_lateral: Array | None = None
+
+    def prepare(self) -> None:
+        """Compute what the source would compute for the first contact at a place."""
+        if isinstance(self._normal, Prepared):
+            self._normal.prepare()
 
     def reset(self) -> None:
         """Forget the last frame."""

@@ -123,6 +123,11 @@ class CheckedIndenter:
         self.named, self.witness = named, witness
         self.reset()
 
+    def prepare(self) -> None:
+        """Compute what both have of the whole pad, so that no frame waits for it."""
+        self.named.prepare()
+        self.witness.prepare()
+
     def reset(self) -> None:
         """Forget the last frame."""
         self.witness.reset()

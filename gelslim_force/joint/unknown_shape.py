@@ -64,6 +64,10 @@ class UnknownShape:
         self.without_strain = without_strain
         self.reset()
 
+    def prepare(self) -> None:
+        """Compute what all nodes do to markers and light, so that no frame waits for it."""
+        self.estimator.responses.prepare()
+
     def reset(self) -> None:
         """Forget the last frame."""
         self._last: JointForces | None = None

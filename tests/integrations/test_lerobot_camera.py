@@ -35,6 +35,9 @@ class Pipeline:
         self.seen: list[np.ndarray] = []
         self.rests: list[np.ndarray] = []
 
+    def prepare(self) -> None:
+        assert not self.seen
+
     def process(self, frame: Frame) -> Any:
         self.seen.append(frame.image)
         return FRAMES[(len(self.seen) - 1) % len(FRAMES)]

@@ -105,6 +105,9 @@ class Pipeline:
         self.stamps: list[float | None] = []
         self.rests = 0
 
+    def prepare(self) -> None:
+        assert not self.stamps
+
     def process(self, picture: np.ndarray, stamp_s: float | None = None) -> Any:
         self.stamps.append(stamp_s)
         return FRAMES[len(self.stamps) - 1]

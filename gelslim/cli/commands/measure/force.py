@@ -119,6 +119,8 @@ def force(
         if indenter is None and normal is not None and depth_maps is None:
             _note_unused(operator is not None or not budget.unlimited or method != "auto")
         pipeline = ForcePipeline(built.bundle, built.calibration, settings, normal, built.share)
+        if source.live:
+            pipeline.prepare()
         manifest = {
             "bundle": str(bundle), "frames": frames,
             **chosen, "operator": pipeline.operator_name, "indenter": indenter,

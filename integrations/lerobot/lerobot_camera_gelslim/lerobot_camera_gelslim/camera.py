@@ -77,6 +77,7 @@ class GelslimCamera(Camera):
         frames = open_frames(config.source, config.fps)
         self._stream = SensorStream(pipeline, frames)
         if warmup and frames.live:
+            pipeline.prepare()
             try:
                 self._stream.next(_FIRST_PICTURE_S)
             except BaseException:

@@ -56,6 +56,7 @@ class ForceNode(Node):
             gel_calibration=self._value("gel_calibration") or None,
             light_calibration=self._value("light_calibration") or None,
         )
+        pipeline.prepare()
         self._server = ForceServer(
             pipeline,
             self._publish,
