@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -183,11 +184,12 @@ def normal_source(
         return unknown_source(bundle, calibration, picture, settings, light, sensor.more)
     named = indenter_source(bundle, calibration, picture, indenter, depth_mm, settings)
     named = sensor.varied(named, settings)
-    checked = (settings or PipelineSettings()).check_indenter
-    if grey or not (checked and _shows_shapes(bundle, picture, grey)):
+    chosen = settings or PipelineSettings()
+    if grey or not (chosen.check_indenter and _shows_shapes(bundle, picture, grey)):
         return named
     # The model of a named contact, with whose force it is compared, is linear.
-    witness = unknown_shape(bundle, calibration, picture, gel="linear", settings=WITNESS)
+    seen = replace(WITNESS, gamma=chosen.gamma)
+    witness = unknown_shape(bundle, calibration, picture, gel="linear", settings=seen)
     return CheckedIndenter(named, witness)
 
 
@@ -290,13 +292,13 @@ def unknown_source(
         )
     calibration.require_bundle(bundle)
     chosen = settings or PipelineSettings()
-    on_nodes = None if reference is None or chosen.finer_pressure else ON_NODES
+    by_light = replace(JointSettings() if chosen.finer_pressure else ON_NODES, gamma=chosen.gamma)
     return unknown_shape(
         bundle,
         calibration,
         reference,
         gel=chosen.gel,
-        settings=on_nodes,
+        settings=None if reference is None else by_light,
         light=light,
         more=more,
     )

@@ -9,6 +9,7 @@ from gelslim_core.budget.budget import Budget
 from gelslim_force.forces.contact_forces import ContactForces
 from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
 from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm, law_of
+from gelslim_force.joint.settings import USUAL_GAMMA
 from gelslim_force.motion.marker_motion import COMPENSATIONS, Compensation
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.tracking.drift_filter import DriftSettings
@@ -44,6 +45,9 @@ class PipelineSettings:
         finer_pressure: Whether the forces of an object of unknown shape, by light and markers, are
             fitted at last with normal forces at half the pitch of the nodes. Without it, a frame
             takes 70 % of the time, and normal forces are 2 % too small in the mean.
+        gamma: Response of the camera, whose grey values are light^(1/gamma): 1 for a linear one.
+            Where forces are those of an unknown shape by light and markers, their gain of the light
+            depends on it. A calibrated light has its own.
         check_indenter: Whether a named indenter is compared with the forces of an unknown shape,
             where light and colour allow these.
 
@@ -62,6 +66,7 @@ class PipelineSettings:
     least_coverage: float = 0.3
     drift: DriftSettings = field(default_factory=DriftSettings)
     finer_pressure: bool = True
+    gamma: float = USUAL_GAMMA
     check_indenter: bool = True
 
     def __post_init__(self) -> None:
@@ -79,6 +84,8 @@ class PipelineSettings:
             raise ValueError(f"gel {self.gel!r}: must be one of {', '.join(GELS)}")
         if self.noise_px is not None and not self.noise_px >= 0:
             raise ValueError(f"noise_px = {self.noise_px:g}: must be >= 0")
+        if not 0.2 <= self.gamma <= 5:
+            raise ValueError(f"gamma = {self.gamma:g}: must be in 0.2 ... 5")
         if not 0 <= self.least_coverage <= 1:
             raise ValueError(f"least_coverage = {self.least_coverage:g}: must be in 0 ... 1")
 

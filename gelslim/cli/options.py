@@ -19,6 +19,16 @@ OverlayPictures = Annotated[
 MostFrames = Annotated[
     int | None, typer.Option("--frames", min=1, help="Stop after this number of frames.")
 ]
+CameraResponse = Annotated[
+    float | None,
+    typer.Option(
+        "--gamma",
+        min=0.2,
+        max=5.0,
+        show_default="1.8",
+        help="Response of the camera: grey = light^(1/gamma), 1 for a linear one.",
+    ),
+]
 SensorBundle = Annotated[
     Path, typer.Argument(metavar="BUNDLE", help="Folder of the sensor's bundle.")
 ]

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from gelslim_force.joint.light.calibration import LightCalibration
 
 
+USUAL_GAMMA = 1.8
+"""Response of a usual camera: its grey values are light^(1/1.8)."""
 USUAL_CELL = 0.4
 """Side of a cell over the thickness, for which nodal limits and reaches are stated."""
 
@@ -86,7 +88,7 @@ class JointSettings:
     height_share: float = 0.07
     edge_share: float = 0.05
     gain_sigma: float = 0.2
-    gamma: float = 1.8
+    gamma: float = USUAL_GAMMA
     roughness: float = 0.17
     deep_roughness: float = 2.0
     normal_stress: float = 1.4

@@ -172,3 +172,8 @@ def test_a_reference_of_another_size_is_refused(place, reference) -> None:
         open_sensor(place / "bundle", reference=reference[:240])
     with pytest.raises(GelslimError):
         open_sensor(place / "bundle", reference=reference[:, :, 0] * np.uint8(0))
+
+
+def test_an_impossible_response_is_refused() -> None:
+    with pytest.raises(ValueError, match="gamma = 0"):
+        PipelineSettings(gamma=0.0)

@@ -19,7 +19,7 @@ from gelslim.cli.force_run import (
     result_sinks,
     until_interrupted,
 )
-from gelslim.cli.options import AsJson, MostFrames, OverlayPictures, SensorBundle
+from gelslim.cli.options import AsJson, CameraResponse, MostFrames, OverlayPictures, SensorBundle
 
 if TYPE_CHECKING:
     import numpy as np
@@ -57,6 +57,7 @@ def force(
     interpolation: option.Interpolation = "sparse",
     gel: option.GelLaw = "auto",
     finer_pressure: option.FinerPressure = True,
+    gamma: CameraResponse = None,
     friction: option.Friction = 1.0,
     drift: option.Drift = "correct",
     drift_px: option.DriftLimit = 0.5,
@@ -92,6 +93,10 @@ def force(
             f"--latest and --all-frames choose between the frames of a camera, and {frames} is "
             "recorded: leave the option out"
         )
+    if gamma is not None and light_calibration is not None:
+        raise CommandError(
+            "--light-calibration holds the response of the camera: leave --gamma out"
+        )
     budget = budget_of(error, within)
     sensor = load_bundle(bundle)
     if not budget.unlimited and operator is None:
@@ -99,7 +104,7 @@ def force(
     chosen = {
         "operator": operator, "method": method, "compensation": compensation,
         "interpolation": interpolation, "gel": gel, "friction": friction,
-        "finer_pressure": finer_pressure,
+        "finer_pressure": finer_pressure, "gamma": gamma,
         "drift": drift, "drift_px": drift_px, "rezero": rezero,
     }  # fmt: skip
     settings = _settings(chosen, budget)
@@ -172,6 +177,7 @@ def _note_unused(chosen: bool) -> None:
 def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
     """Return the settings of the pipeline for these options. Raises CommandError."""
     from gelslim_force.forces.estimator import ForceSettings
+    from gelslim_force.joint.settings import USUAL_GAMMA
     from gelslim_force.settings import PipelineSettings
     from gelslim_force.tracking.drift_filter import DriftSettings
 
@@ -185,6 +191,7 @@ def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
             interpolation=chosen["interpolation"],
             gel=chosen["gel"],
             finer_pressure=chosen["finer_pressure"],
+            gamma=USUAL_GAMMA if chosen["gamma"] is None else chosen["gamma"],
             force=ForceSettings(method=chosen["method"], friction=chosen["friction"]),
             drift=DriftSettings(
                 correct=chosen["drift"] == "correct",
