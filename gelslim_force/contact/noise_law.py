@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 Layers = NDArray[np.floating]
 _LEAST_RATIO = 1.3
-"""Noise of the brighter half of the bins over that of the darker half, both over even noise, from
-which shot noise counts."""
+"""Least ratio of the noise of the brighter half of the bins to that of the darker half, both
+relative to even noise, for shot noise to be assumed."""
 _ROWS, _LEAST_BINS = 8, 40
-"""Rows of bins for one that tells, and the least number of such bins."""
+"""One row of bins in this many is used, and at least so many bins are needed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class NoiseLaw:
         Args:
             change: (c, rows, columns) of the light.
             noise: (c, rows, columns) its standard deviations by even noise.
-            valid: (rows, columns) bins that tell.
+            valid: (rows, columns) bins to use.
         """
         some = valid[::_ROWS]
         rows, columns = np.nonzero(some[:, :-2] & some[:, 1:-1] & some[:, 2:])
