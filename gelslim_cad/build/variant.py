@@ -20,7 +20,7 @@ from gelslim_cad.checks import Check
 from gelslim_cad.spec.parts import files_key
 from gelslim_core.errors import GelslimError
 from gelslim_core.files.replaced_folder import recover
-from gelslim_core.jobs import worker_pool
+from gelslim_core.worker_pool import worker_pool
 
 if TYPE_CHECKING:
     from gelslim_cad.build.stages import Plan, Stages

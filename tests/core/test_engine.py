@@ -12,7 +12,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import pool_tasks
 
-from gelslim_core.jobs import Engine, EngineError, worker_pool
+from gelslim_core.jobs import Engine, EngineError
+from gelslim_core.worker_pool import worker_pool
 
 
 @pytest.fixture(autouse=True)

@@ -16,7 +16,7 @@ from sweep_commands import ROOT, environment, heeds_interrupts
 
 from gelslim.cli.failure import _as_json
 from gelslim.ending import SAID, Terminated, asked_to_end, say
-from gelslim_core import jobs
+from gelslim_core import worker_pool as workers
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals process groups")
 BOTH = (signal.SIGINT, signal.SIGTERM)
@@ -315,7 +315,7 @@ def test_the_signal_behind_an_error_is_found() -> None:
 
 POOL = """
 from pool_task import task
-from gelslim_core.jobs import worker_pool
+from gelslim_core.worker_pool import worker_pool
 with worker_pool(2, "{method}") as pool:
     futures = [pool.submit(task, k) for k in range(6)]
     futures[0].result()
@@ -386,21 +386,37 @@ def test_a_second_signal_while_a_swallowed_one_is_told_raises_nothing(
         if len(repeated) == 1:
             signal.raise_signal(signal.SIGTERM)
 
-    monkeypatch.setattr(jobs, "_terminate_soon", soon)
-    monkeypatch.setattr(jobs, "_is_busy", True)
-    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(workers, "_terminate_soon", soon)
+    monkeypatch.setattr(workers, "_is_busy", True)
+    before = signal.signal(signal.SIGTERM, workers._terminate)
     try:
-        hook = jobs._unraisable(lambda raised: None)
-        hook(SimpleNamespace(exc_value=jobs._Terminated()))
+        hook = workers._unraisable(lambda raised: None)
+        hook(SimpleNamespace(exc_value=workers._Terminated()))
     finally:
         signal.signal(signal.SIGTERM, before)
     assert len(repeated) == 2
+
+
+def test_a_worker_keeps_its_handler_while_its_task_unwinds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Python prints an error for a signal that arrives while SIG_IGN takes the handler's place."""
+    monkeypatch.setattr(workers, "_unwinds", False)
+    monkeypatch.setattr(workers, "_is_busy", True)
+    before = signal.signal(signal.SIGTERM, workers._terminate)
+    try:
+        with pytest.raises(workers._Terminated):
+            signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
+        assert signal.getsignal(signal.SIGTERM) is workers._terminate
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_what_compiled_code_prints_before_it_swallows_it_is_not_shown(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Cython calls the hook for uncaught exceptions in functions that return none."""
-    for error in (jobs._Terminated(), ValueError("another")):
-        jobs._uncaught(type(error), error, None)
+    for error in (workers._Terminated(), ValueError("another")):
+        workers._uncaught(type(error), error, None)
     assert capsys.readouterr().err.strip() == "ValueError: another"

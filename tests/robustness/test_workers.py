@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
 
 POOL = """
 import os, sys, time
-from gelslim_core.jobs import worker_pool
+from gelslim_core.worker_pool import worker_pool
 
 def main():
     with worker_pool(3, sys.argv[1]) as pool:
