@@ -113,8 +113,9 @@ def is_blurred_as_the_rule_says(d: Dimensions) -> None:
     )
     assert max(near, far) == pytest.approx(d["view.image_blur_px"], rel=0.05)
     # At best focus the nearest and the farthest image are blurred alike. The farthest is that of
-    # the far edge; a camera that is hardly tilted has the nearest there as well.
-    if d["view.near_tangential_mm"] < d["view.far_tangential_mm"]:
+    # the far edge; a camera that is hardly tilted has the nearest there as well, or in the middle.
+    tilted = blur_px(lens, (0.0, 0.0)) < near
+    if tilted and d["view.near_tangential_mm"] < d["view.far_tangential_mm"]:
         assert near == pytest.approx(far, rel=0.05)
 
 
@@ -171,7 +172,9 @@ def motion_is_measured(name: str, samples: int) -> None:
     bump = np.prod(np.cos(np.pi / 2 * np.clip(at / half, -1, 1)) ** 2, axis=1)
     true_mm = bump[:, None] * [0.16, -0.12]
     still = picture(bundle, lens, 0 * true_mm, samples)
-    sensor = gelslim.open_sensor(bundle, reference=still, settings=PipelineSettings(rung="fft"))
+    sensor = gelslim.open_sensor(
+        bundle, reference=still, indenter="none", settings=PipelineSettings(rung="fft")
+    )
     sensor.process(still)
     result = sensor.process(picture(bundle, lens, true_mm, samples))
     assert result.tracks is not None
