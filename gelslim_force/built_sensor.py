@@ -5,10 +5,8 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from gelslim_force.calibration.sensor_calibration import Calibration
-from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
+from gelslim_force.contact.indenter_source import IndenterSource
 from gelslim_force.forces.finite_strain import law_of
 from gelslim_force.joint.light.calibration import LightCalibration, read_light_calibration
 from gelslim_force.presses.gel_calibration import (
@@ -42,12 +40,8 @@ class BuiltGel:
     def varied(self, source: IndenterSource, settings: PipelineSettings | None) -> IndenterSource:
         """The source with the derivatives of its motion by the parameters of the gel."""
         chosen = settings or PipelineSettings()
-        points_mm = np.asarray(self.bundle.mesh.surface_mm)
         # The same operators as of the source itself: a difference of two kinds is no derivative.
-        models = [
-            (NormalModel(chosen.compliance(b), points_mm, chosen.edge(b)), step)
-            for b, step in self.more
-        ]
+        models = [(chosen.contact(b, source.indenter), step) for b, step in self.more]
         return replace(source, varied=tuple(models))
 
 

@@ -18,7 +18,7 @@ from gelslim_force.calibration.file import read_calibration
 from gelslim_force.calibration.reference_picture import read_reference
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.indenter import Indenter, parse_indenter
-from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
+from gelslim_force.contact.indenter_source import IndenterSource
 from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.frames.upright import upright
@@ -249,7 +249,7 @@ def indenter_source(
         opposed=bool(bundle.light) and colours_oppose(LightMap.from_arrays(bundle.light)),
     )
     chosen = settings or PipelineSettings()
-    model = NormalModel(chosen.compliance(bundle), points_mm, chosen.edge(bundle))
+    model = chosen.contact(bundle, shape)
     hidden_n = JointSettings().unseen_force * bundle.material.youngs_modulus_mpa
     hidden_mm = hidden_n / layer_stiffness_n_mm(bundle)
     return IndenterSource(finder, model, shape, depth_mm, hidden_n=hidden_n, hidden_mm=hidden_mm)

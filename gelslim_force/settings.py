@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from gelslim_core.budget.budget import Budget
+from gelslim_force.contact.ball_model import BallModel, contact_model
+from gelslim_force.contact.indenter import Indenter
+from gelslim_force.contact.normal_motion import NormalModel
 from gelslim_force.forces.contact_forces import ContactForces
 from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
 from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm, law_of
@@ -126,6 +129,11 @@ class PipelineSettings:
             return ContactCompliance.shared(bundle)
         except MeshError:
             return None
+
+    def contact(self, bundle: Bundle, indenter: Indenter) -> NormalModel | BallModel:
+        """Contact of a known indenter with the pad. Raises as `operator`."""
+        mesh = NormalModel(self.compliance(bundle), bundle.mesh.surface_mm, self.edge(bundle))
+        return contact_model(mesh, bundle, indenter)
 
     def law(self, bundle: Bundle, operator: SurfaceOperator) -> FiniteStrainForce | DepthLaw | None:
         """The law of the gel, where it is not that of the operator alone."""

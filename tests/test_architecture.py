@@ -40,7 +40,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "errors", "lazy", "optional_library", "uncertainty", "immutable", "figure", "html_table",
         "kernel_cache",
         "files",
-        "budget", "cluster", "jobs", "yaml",
+        "budget", "cluster", "worker_pool", "jobs", "yaml",
     ),
     "gelslim_optics": ("camera", "guide", "light"),
     "ifem_export": (
@@ -48,7 +48,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "markers", "bundle", "compliance", "exports",
     ),
     "gelslim_force": (
-        "frames", "detection", "lattice", "contact", "motion", "tracking", "calibration",
+        "frames", "detection", "lattice", "layer", "contact", "motion", "tracking", "calibration",
         "forces", "joint", "dot_tracking", "imported", "outputs", "scoring", "settings", "presses",
         "pipeline", "built_sensor", "sensor", "run",
     ),

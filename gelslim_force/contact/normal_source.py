@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -69,6 +69,8 @@ class NormalReading:
             is seen, or would be.
         shown: (c,) nodes whose motion the source sees where their markers are lost; None where it
             sees none.
+        errors_mm: (p, c) errors of the motion that do not depend on each other, one standard
+            deviation of each at all nodes; None where `sigma_mm` is one such error.
     """
 
     w_mm: Array
@@ -83,6 +85,7 @@ class NormalReading:
     push_sigma_n: float = float("nan")
     hidden_n: float = 0.0
     shown: NDArray[np.bool_] | None = None
+    errors_mm: Array | None = None
 
     @classmethod
     def given(cls, count: int, normal_mm: ArrayLike, sigma_mm: ArrayLike) -> NormalReading:
@@ -129,6 +132,16 @@ class NormalReading:
     def known(self) -> bool:
         """Whether there is a motion."""
         return not self.problem
+
+    @property
+    def common_errors_mm(self) -> Array:
+        """(p, c) independent errors of the motion, each at all nodes."""
+        return self.sigma_mm[None] if self.errors_mm is None else self.errors_mm
+
+    def with_error(self, error_mm: Array) -> NormalReading:
+        """The reading with another independent error, whose standard deviation is (c,)."""
+        errors = None if self.errors_mm is None else np.vstack([self.errors_mm, error_mm])
+        return replace(self, sigma_mm=np.hypot(self.sigma_mm, error_mm), errors_mm=errors)
 
     def summary(self) -> dict[str, object]:
         """What was found of the contact, as plain numbers."""

@@ -123,4 +123,4 @@ class ContactMotion:
         hidden_mm = self._unseen.hidden_mm(tracked)
         if reading.shown is not None:
             hidden_mm = np.where(reading.shown, 0.0, hidden_mm)
-        return replace(reading, sigma_mm=np.hypot(reading.sigma_mm, hidden_mm))
+        return reading.with_error(hidden_mm)

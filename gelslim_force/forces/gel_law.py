@@ -50,7 +50,7 @@ class GelLaw:
 
     @classmethod
     def of_layer(cls, thickness_mm: float) -> GelLaw:
-        """The law of `presses.ball_on_layer` for a thickness in mm: linear at every depth."""
+        """The law of `layer.ball_on_layer` for a thickness in mm: linear at every depth."""
         return cls(LINEAR, LINEAR, "", DEEP_SHARE * thickness_mm, True)
 
     def at(self, displacement_mm: Array, by_linear_law: bool = False) -> dict[str, Any]:

@@ -155,14 +155,20 @@ class WrenchNoise:
                 of the gains: their apparent motion is taken off for a depth that is wrong or
                 unknown.
         """
-        flat = gains.reshape(6, -1)
-        noise = flat * np.repeat(sigma, 2)
-        common = np.zeros(6)
-        if normal_sigma_mm is not None:
-            common += self.response[:, :, 2] @ normal_sigma_mm
-        if lateral is not None:
-            common += flat @ lateral.reshape(-1)
+        noise = gains.reshape(6, -1) * np.repeat(sigma, 2)
+        common = self.common(gains, normal_sigma_mm, lateral)
         return np.asarray(noise @ noise.T + np.outer(common, common))
+
+    def common(
+        self, gains: Array, normal_mm: Array | None = None, lateral: Array | None = None
+    ) -> Array:
+        """(6,) change of the wrench by one error at all nodes and markers, as in `covariance`."""
+        found = np.zeros(6)
+        if normal_mm is not None:
+            found += self.response[:, :, 2] @ normal_mm
+        if lateral is not None:
+            found += gains.reshape(6, -1) @ lateral.reshape(-1)
+        return found
 
     def wrench(self, force_n: Array, covariance: Array) -> Wrench:
         """Wrench of nodal forces (c, 3); NaN for what an unknown normal motion leaves open."""

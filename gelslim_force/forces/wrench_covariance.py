@@ -73,11 +73,12 @@ class WrenchCovariance:
         sigma = np.full(gains.shape[1], noise_px)
         sigma[filled.unseen] = 0.0
         if reading is not None and reading.known:
-            if reading.sigma_mm.any():
-                lateral = self._in_px(self._motion.compensation_change(reading.sigma_mm))
-                found = self._wrench.covariance(gains, sigma, reading.sigma_mm, lateral)
-            else:
-                found = self._wrench.covariance(gains, sigma)
+            found = self._wrench.covariance(gains, sigma)
+            for error_mm in reading.common_errors_mm:
+                if error_mm.any():
+                    lateral = self._in_px(self._motion.compensation_change(error_mm))
+                    common = self._wrench.common(gains, error_mm, lateral)
+                    found += np.outer(common, common)
             return rigid + found + self._hidden(reading.hidden_n)
         noise_mm = noise_px * self._motion.view.usual_mm_per_px
         apparent = self._motion.apparent_motion(filled.motion_mm, self._unknown_normal_mm, noise_mm)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.uncertainty import with_sigma
-from gelslim_force.contact.normal_motion import IndenterSource
+from gelslim_force.contact.indenter_source import IndenterSource
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch
 from gelslim_force.joint.fit_state import JointForces

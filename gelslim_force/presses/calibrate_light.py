@@ -16,8 +16,8 @@ from gelslim_force.joint.light.calibration import LightCalibration
 from gelslim_force.joint.light.view import LightView
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.settings import JointSettings
+from gelslim_force.layer.ball_on_layer import BallOnLayer
 from gelslim_force.presses.ball_check import fitted_ball, require_ball
-from gelslim_force.presses.ball_on_layer import BallOnLayer
 from gelslim_force.presses.gel_calibration import GelCalibration
 from gelslim_force.presses.gel_fit import FittedGel, fit_gel
 from gelslim_force.presses.gel_skin import known_skin

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from gelslim_core.html_table import table_html
-from gelslim_force.presses.ball_on_layer import BallOnLayer
+from gelslim_force.layer.ball_on_layer import BallOnLayer
 from gelslim_force.presses.gel_calibration import GelCalibration
 from gelslim_force.presses.scatter_svg import Scatter, scatter_svg
 from ifem_export.elements.skin import Membrane

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gelslim_force.joint.light.calibration import TERMS, place_terms
 from gelslim_force.joint.light.view import LightView, SeenLight
 from gelslim_force.joint.normal_equations import huber
-from gelslim_force.presses.ball_on_layer import BallOnLayer
+from gelslim_force.layer.ball_on_layer import BallOnLayer
 from gelslim_optics.light.light_law import LightLaw
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.estimator import surface_share_mm2
+from gelslim_force.layer.ball_on_layer import BallOnLayer
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.motion.printed_dots import PrintedDots
-from gelslim_force.presses.ball_on_layer import BallOnLayer
 from gelslim_force.presses.radial_motion import RadialMotion
 from gelslim_force.presses.seen_press import PressView, SeenPress
 from gelslim_force.settings import PipelineSettings

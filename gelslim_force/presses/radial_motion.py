@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from gelslim_force.presses.ball_on_layer import BallOnLayer
+from gelslim_force.layer.ball_on_layer import BallOnLayer
 
 Array = NDArray[np.float64]
 _INSIDE, _OUTSIDE, _OUTSIDE_PER_THICKNESS = 28, 24, 8

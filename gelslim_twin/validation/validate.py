@@ -21,7 +21,7 @@ from gelslim_core.budget.budget import Budget
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.design import bundle_camera
 from gelslim_force.calibration.sensor_calibration import Calibration
-from gelslim_force.contact.normal_motion import IndenterSource
+from gelslim_force.contact.indenter_source import IndenterSource
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.forces.estimator import ForceSettings
 from gelslim_force.forces.frame_result import FrameResult

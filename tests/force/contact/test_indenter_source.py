@@ -9,7 +9,8 @@ import pytest
 from pad_samples import node_forces_n
 
 from gelslim_force.contact.indenter import Sphere
-from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
+from gelslim_force.contact.indenter_source import IndenterSource
+from gelslim_force.contact.normal_motion import NormalModel
 from gelslim_force.contact.patch import ContactPatch
 from gelslim_force.contact.shading_change import ShadingChange
 from ifem_export.elements.material import Material

@@ -15,7 +15,7 @@ from pressed_samples import Pressed, calibration, lit_bundle, reference
 from pressed_shapes import Shape, ball, edge, pressed_shape, punch, rod, two_balls
 from shaded_frames import shaded
 
-from gelslim_force.contact.normal_motion import IndenterSource
+from gelslim_force.contact.indenter_source import IndenterSource
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.checked_indenter import CheckedIndenter

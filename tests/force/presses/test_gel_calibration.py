@@ -13,7 +13,8 @@ from ball_presses import ball_bundle, ball_calibration
 from pad_samples import hertz_like, small_bundle
 
 from gelslim_force.contact.indenter import Sphere
-from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
+from gelslim_force.contact.indenter_source import IndenterSource
+from gelslim_force.contact.normal_motion import NormalModel
 from gelslim_force.contact.patch import ContactPatch
 from gelslim_force.forces.wrench import Wrench, WrenchNoise
 from gelslim_force.presses.gel_calibration import (

@@ -22,7 +22,8 @@ from pad_samples import hertz_like, small_bundle
 from weighed_presses import LOADS_N, calibrated, presses
 
 from gelslim_force.contact.indenter import Sphere
-from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
+from gelslim_force.contact.indenter_source import IndenterSource
+from gelslim_force.contact.normal_motion import NormalModel
 from gelslim_force.contact.patch import ContactPatch
 from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_force.forces.wrench import WrenchNoise

@@ -10,7 +10,7 @@ from contact_pads import YOUNGS_MPA, dense_compliance, small_pad
 from stepping_rig import DT_S, Array, at, linear_twin, pad_folder, turned
 from test_stiffness import EXACT, assert_derivative
 
-from gelslim_force.presses.ball_on_layer import BallOnLayer
+from gelslim_force.layer.ball_on_layer import BallOnLayer
 from gelslim_twin.contact.contact_forces import solve_contact_forces
 from gelslim_twin.contact.soft_layer import SoftLayer
 from gelslim_twin.scene.indenter import Cylinder

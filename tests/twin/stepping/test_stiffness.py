@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from stepping_rig import DT_S, LINEAR, Array, at, linear_twin, pad_folder
 
-from gelslim_force.presses.ball_on_layer import BallOnLayer
+from gelslim_force.layer.ball_on_layer import BallOnLayer
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.step import Step
 from gelslim_twin.stepping.twin import Twin

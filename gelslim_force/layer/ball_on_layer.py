@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j0, j1
 
-from gelslim_force.presses.layer_response import LayerResponse
+from gelslim_force.layer.layer_response import LayerResponse
 
 Array = NDArray[np.float64]
 _POINTS, _POINTS_PER_THICKNESS = 24, 8

@@ -9,8 +9,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import j1
 
-from gelslim_force.presses.ball_on_layer import BallOnLayer
-from gelslim_force.presses.layer_response import LayerResponse
+from gelslim_force.layer.ball_on_layer import BallOnLayer
+from gelslim_force.layer.layer_response import LayerResponse
 from gelslim_force.presses.press_model import skin_length_mm, skin_parameter
 
 PLANE = 1 / (1 - SKIN_RATIO**2)

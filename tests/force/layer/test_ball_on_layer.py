@@ -8,7 +8,7 @@ from bonded_layer import layer_contact
 from pressed_disc import SKIN_RATIO, membrane_stiffness, pressed_disc, surface_stiffness
 from scipy.optimize import brentq
 
-from gelslim_force.presses.ball_on_layer import BallOnLayer
+from gelslim_force.layer.ball_on_layer import BallOnLayer
 
 
 def test_hertz_on_a_thick_layer() -> None:

@@ -1,0 +1,1 @@
+"""Exact solutions of contacts on a bonded elastic layer."""
