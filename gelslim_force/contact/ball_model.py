@@ -23,7 +23,7 @@ from gelslim_force.layer.ball_table import BallTable
 from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
-_TURNS = 48
+_TURNS = 32
 """Points on each ring of the contact."""
 _SIZE_STEP, _PLACE_STEP = 0.02, 0.1
 """Steps of differences, over the radius of contact and over the node spacing."""
@@ -148,25 +148,28 @@ class BallModel:
     def _pushes(self, patch: ContactPatch) -> tuple[NDArray[np.intp], Array]:
         """Nodes (n,), their forces, and the derivatives of these by x, y and size, (n, 4)."""
         step, grown = _PLACE_STEP * self.mesh.pitch_mm, _SIZE_STEP * patch.size_mm
-        moves = np.array([[0, 0, 0], *np.diag([step, step, grown]), *-np.diag([step, step, grown])])
-        loads = np.array(
-            [self._loads(patch.centre_mm + m[:2], patch.size_mm + m[2]) for m in moves]
-        )
+        steps = np.diag([step, step, grown])
+        at = np.append(patch.centre_mm, patch.size_mm) + np.vstack([np.zeros(3), steps, -steps])
+        loads = self._loads(at)
         nodes = np.flatnonzero(loads.any(axis=0))
         used = loads[:, nodes]
-        slopes = (used[1:4] - used[4:]) / (2 * np.array([[step], [step], [grown]]))
+        slopes = (used[1:4] - used[4:]) / (2 * np.diag(steps)[:, None])
         return nodes, np.vstack([used[:1], slopes]).T
 
-    def _loads(self, centre_mm: Array, size_mm: float) -> Array:
-        """Forces (c,) of the pressure of a contact; what is beyond the edge goes to the others."""
-        forces = self.layer.young_mpa * self._table.forces_per_mpa(size_mm)
+    def _loads(self, contacts: Array) -> Array:
+        """Forces (s, c) of the pressure of contacts (s, 3) by x, y and size.
+
+        What is beyond the edge of the pad goes to the nodes that bear the rest.
+        """
+        x, y, size = contacts.T[:, :, None, None]
+        forces = self.layer.young_mpa * self._table.forces_per_mpa(contacts[:, 2])
         turn = 2 * np.pi / _TURNS * np.arange(_TURNS)
-        ring = size_mm * self._table.rings[:, None]
-        x, y = centre_mm[0] + ring * np.cos(turn), centre_mm[1] + ring * np.sin(turn)
-        each = np.broadcast_to(forces[:, None] / _TURNS, x.shape)
-        loads = self._lattice.loads(x.ravel(), y.ravel(), each.ravel())
-        on_pad = loads.sum()
-        return loads * (forces.sum() / on_pad) if on_pad > 0 else loads
+        ring = size * self._table.rings[:, None]
+        each = np.broadcast_to(forces[..., None] / _TURNS, (*forces.shape, _TURNS))
+        loads = self._lattice.loads(x + ring * np.cos(turn), y + ring * np.sin(turn), each)
+        on_pad = loads.sum(axis=1, keepdims=True)
+        whole = forces.sum(axis=1, keepdims=True)
+        return loads * np.divide(whole, on_pad, out=np.zeros_like(whole), where=on_pad > 0)
 
     def _by_edge(self, patch: ContactPatch, ball: Indenter) -> tuple[float, float]:
         """Depth and force over those of the same contact in the middle of the pad."""
@@ -227,23 +230,18 @@ class _Lattice:
         return np.rint(move_mm / self.step_mm) * self.step_mm
 
     def loads(self, x: Array, y: Array, force: Array) -> Array:
-        """Forces (c,) on the nodes of forces (n,) at points, by bilinear functions."""
-        count = int(self.number.max())
-        along, across = (
-            (x - self.origin_mm[0]) / self.step_mm[0],
-            (y - self.origin_mm[1]) / (self.step_mm[1]),
-        )
-        i, j = np.floor(along).astype(np.intp), np.floor(across).astype(np.intp)
+        """Forces (s, c) on the nodes of forces (s, ...) at points, by bilinear functions."""
+        sets, count = len(x), int(self.number.max())
+        step, (rows, columns) = self.step_mm, self.number.shape
+        along, across = (x - self.origin_mm[0]) / step[0], (y - self.origin_mm[1]) / step[1]
+        i, j = np.floor(along), np.floor(across)
         p, q = along - i, across - j
-        rows, columns = self.number.shape
-        found = np.zeros(count + 1)
-        for di, dj, weight in (
-            (0, 0, (1 - p) * (1 - q)),
-            (1, 0, p * (1 - q)),
-            (0, 1, (1 - p) * q),
-            (1, 1, p * q),
-        ):
-            row = np.clip(i + di + 1, 0, rows - 1)
-            column = np.clip(j + dj + 1, 0, columns - 1)
-            found += np.bincount(self.number[row, column], weight * force, count + 1)
-        return found[:-1]
+        # The margin of the lattice bears what is farther out.
+        low = [np.clip(k, -1, n - 3).astype(np.intp) + 1 for k, n in ((i, rows), (j, columns))]
+        number, own = self.number, (count + 1) * np.arange(sets).reshape(-1, *[1] * (x.ndim - 1))
+        found = np.zeros(sets * (count + 1))
+        for u, v in np.ndindex(2, 2):
+            weight = np.abs(1 - u - p) * np.abs(1 - v - q) * force
+            entry = number[low[0] + u, low[1] + v] + own
+            found += np.bincount(entry.ravel(), weight.ravel(), len(found))
+        return found.reshape(sets, -1)[:, :-1]

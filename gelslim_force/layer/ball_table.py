@@ -62,9 +62,10 @@ class BallTable:
         """Depth of the ball's lowest point below the rest surface."""
         return float(self._at(size_mm)[0]) * size_mm**2 / self.ball_mm
 
-    def forces_per_mpa(self, size_mm: float) -> Array:
-        """Forces (k,) on the rings over Young's modulus."""
-        return np.asarray(self._at(size_mm)[2:] * size_mm**3 / self.ball_mm)
+    def forces_per_mpa(self, size_mm: float | Array) -> Array:
+        """Forces (..., k) on the rings over Young's modulus, for one size or more (...)."""
+        unit = np.asarray(size_mm) ** 3 / self.ball_mm
+        return np.asarray(self._at(size_mm)[..., 2:] * unit[..., None])
 
     def at_rest(self, seen_mm: float) -> tuple[float, float]:
         """Radius of contact in the gel at rest, and its standard deviation, of a patch as seen.
@@ -80,5 +81,5 @@ class BallTable:
         """Motion outwards of the rim of a contact without friction."""
         return float(self._at(size_mm)[1]) * size_mm**2 / self.ball_mm
 
-    def _at(self, size_mm: float) -> Array:
+    def _at(self, size_mm: float | Array) -> Array:
         return np.asarray(self._by_size(np.log(size_mm)))
