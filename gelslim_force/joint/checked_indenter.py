@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.uncertainty import with_sigma
+from gelslim_force.contact.ball_model import BallModel
 from gelslim_force.contact.indenter_source import IndenterSource
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch
@@ -26,8 +27,9 @@ from gelslim_force.joint.unknown_shape import LARGEST_UNEXPLAINED, UnknownShape
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _SIGMAS = 2.0
-_MODEL_ERROR = 0.15
-"""Error of the named indenter's force by outline, mesh and friction, over the larger force."""
+_MODEL_ERROR, _BALL_ERROR = 0.15, 0.1
+"""Error of the named indenter's force by outline, mesh and friction, over the larger force; that of
+a ball by the exact solution of a layer."""
 _MOST_NAMED = 0.05
 """Largest standard deviation of the named indenter's force that counts, over the larger force: the
 patch of another shape may have any size."""
@@ -201,7 +203,9 @@ class CheckedIndenter:
         seen, sigma = float(found.force_n[:, 2].sum()), float(np.sqrt(found.covariance[2, 2]))
         larger = max(abs(seen), abs(named))
         own = min(reading.push_sigma_n, _MOST_NAMED * larger)
-        allowed = _SIGMAS * float(np.hypot(sigma, own)) + _MODEL_ERROR * larger
+        exact = isinstance(self.named.model, BallModel)
+        model = (_BALL_ERROR if exact else _MODEL_ERROR) * larger
+        allowed = _SIGMAS * float(np.hypot(sigma, own)) + model
         if abs(named - seen) <= allowed:
             return _Verdict()
         return _Verdict(_ANOTHER.format(seen=with_sigma(seen, sigma), named=named))

@@ -15,7 +15,9 @@ from pressed_samples import Pressed, calibration, lit_bundle, reference
 from pressed_shapes import Shape, ball, edge, pressed_shape, punch, rod, two_balls
 from shaded_frames import shaded
 
+from gelslim_force.contact.ball_model import BallModel, PadLayer
 from gelslim_force.contact.indenter_source import IndenterSource
+from gelslim_force.contact.normal_motion import NormalModel
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.checked_indenter import CheckedIndenter
@@ -27,6 +29,7 @@ from gelslim_force.sensor import open_sensor
 from gelslim_force.settings import PipelineSettings
 
 LARGEST_OFF = 0.25
+BALL_MODEL = BallModel(cast("NormalModel", None), PadLayer(0.147, 0.3223, 2.0), 8.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,15 +225,25 @@ def test_a_comparison_does_not_wait_for_ever(searched: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("push_n", "push_sigma_n", "refused"),
-    [(0.19, 0.012, False), (0.19, 0.001, True), (0.31, 0.015, False), (0.12, 0.1, True)],
+    ("push_n", "push_sigma_n", "model", "refused"),
+    [
+        (0.19, 0.012, None, False),
+        (0.19, 0.001, None, True),
+        (0.31, 0.015, None, False),
+        (0.12, 0.1, None, True),
+        (0.185, 0.012, None, False),
+        (0.185, 0.012, BALL_MODEL, True),
+    ],
 )
 def test_the_size_of_the_patch_is_known_as_well_as_it_says(
-    push_n: float, push_sigma_n: float, refused: bool
+    push_n: float, push_sigma_n: float, model: BallModel | None, refused: bool
 ) -> None:
-    """A force that could be any confirms nothing, though it does not contradict."""
+    """A force that could be any confirms nothing, though it does not contradict.
+
+    The model of a ball is more exact than those of other shapes.
+    """
     source = CheckedIndenter(
-        cast("IndenterSource", None),
+        cast("IndenterSource", SimpleNamespace(model=model)),
         cast("UnknownShape", SimpleNamespace(reset=lambda: None, most_gain=0.3)),
     )
     reading = replace(NormalReading.given(1, [-0.1], 0.0), push_n=push_n, push_sigma_n=push_sigma_n)
