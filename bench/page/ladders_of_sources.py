@@ -14,6 +14,11 @@ GIVEN = {"ball known": "ball given", "depth known": "depth given",
          "light of three colours and markers": "third light"}  # fmt: skip
 """Sources that need more than the others: they answer questions of their own."""
 
+REFERENCES = {
+    "any object": "Tractions on a pad of half the pitch with eight layers",
+    "ball": "Balls on a layer of axisymmetric elements, sheared by friction",
+}
+
 
 def sources(data: Data, header: Data) -> list[LadderRecord]:
     """Normal sources on patches of any shape, and on balls."""
@@ -23,16 +28,14 @@ def sources(data: Data, header: Data) -> list[LadderRecord]:
 
 def ladder(kind: str, data: Data, header: Data) -> LadderRecord:
     """What is known of the object, for one kind of objects."""
-    ball = "A known ball has the radius that fits its dent. " if kind == "ball" else ""
     return LadderRecord(
         name=f"normal-sources-{kind.replace(' ', '-')}",
         title=f"Normal force by what is known: {kind}",
         question=f"F_z of {data['presses']} presses ({kind}), of which each is seen in one "
         "picture. A force that is unknown, or too uncertain to be told, counts as 0. The light "
-        f"alone does not tell the shear. {ball}A known depth is the true motion of all nodes.",
+        f"alone does not tell the shear. A known depth is the true motion of all nodes.",
         paper="takes the motion along z as given.",
-        reference="Tractions on a pad of half the pitch with eight layers, drawn by the renderer "
-        "of the tests",
+        reference=REFERENCES[kind] + ", drawn by the renderer of the tests",
         error_label="error of the normal force, RMS",
         error_unit="N",
         time_label="processor time per frame, one thread",

@@ -34,7 +34,7 @@ OURS_AT_MOST = {
     "interpolation": 0.06,
     "compensation": 1e-9,
     "normal-sources-any-object": 0.02,
-    "normal-sources-ball": 0.02,
+    "normal-sources-ball": 0.025,
     "contact-tolerance": 0.05,
     "drawing": 0.003,
     "shading": 2.0,

@@ -159,13 +159,18 @@ def press(seed: int, wide: bool = False) -> Contact:
 
 
 def ball(seed: int) -> Contact:
+    """A ball on a gel as `MadeGel.drawn` gives it."""
+    rng = np.random.default_rng([32, seed])
+    gel, gain = MadeGel.drawn(rng), float(np.exp(rng.normal(0, LIGHT_GAIN)))
+    return ball_on(gel, gain, rng)
+
+
+def ball_on(gel: MadeGel, gain: float, rng: np.random.Generator) -> Contact:
     """A ball that pushes, sticking or not, and shears by friction.
 
     The tangential tractions are those of a layer; the antisymmetric heights that they cause are
     left out, because the ball levels them by a pressure without a resultant.
     """
-    rng = np.random.default_rng([32, seed])
-    gel, gain = MadeGel.drawn(rng), float(np.exp(rng.normal(0, LIGHT_GAIN)))
     ball_mm = float(rng.choice(RADII_MM))
     nominal = lit_bundle()
     thickness = nominal.mesh.layers * nominal.mesh.cell_size_mm[2] * gel.thickness
