@@ -3,7 +3,7 @@
     python -m bench.force.force_sigma              # 200 contacts of each mode
     python -m bench.force.force_sigma --processes 8
     python -m bench.force.force_sigma --deep       # the deep contacts only; the rest is kept
-    python -m bench.force.force_sigma --wide       # only gels whose Poisson's ratio is hardly known
+    python -m bench.force.force_sigma --mode "ball given"   # only one mode; the rest is kept
     python -m bench.force.force_sigma --strong     # only errors of 200 presses of at least 0.2 N
     python -m bench.force.force_sigma --figure     # draw the figure from the data again
 
@@ -51,7 +51,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=200, help="contacts of each mode")
     parser.add_argument("--kept", type=Path, default=KEPT, help="folder for contacts and slices")
     parser.add_argument("--deep", action="store_true", help="score the deep contacts only")
-    parser.add_argument("--wide", action="store_true", help="score only the gels of that name")
+    parser.add_argument("--mode", help='score only one mode, such as "ball given"')
     parser.add_argument("--strong", action="store_true", help="score only presses of 0.2 N or more")
     parser.add_argument("--processes", type=int, default=1, help="that share the contacts")
     parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
@@ -73,12 +73,16 @@ def measured(options: argparse.Namespace, stored: Path) -> dict[str, Any]:
     from sigma_gate import MODES, WIDE
 
     data: dict[str, Any] = {}
-    every = not (options.deep or options.wide or options.strong)
+    every = not (options.deep or options.mode or options.strong)
+    if options.mode not in (None, *MODES, WIDE):
+        raise SystemExit(f"no mode {options.mode!r}: give one of {', '.join((*MODES, WIDE))}")
     if every:
         data = {**machine(31), "cases": options.cases, "modes": scored(options, MODES)}
     else:
         data = json.loads(stored.read_text("utf-8"))
-    if options.wide or every:
+    if options.mode in MODES:
+        data["modes"] |= scored(options, (options.mode,))
+    if options.mode == WIDE or every:
         data["wide"] = scored(options, (WIDE,))[WIDE]
     if options.strong or every:
         data["strong"] = strong_scored(options)

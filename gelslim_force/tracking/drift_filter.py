@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 _JUMP_SIGMAS = 5.0
 _SIGNIFICANT_SIGMAS = 3.0
 _UNKNOWN_PX = 10.0
-_LEAK_SHAPE = np.array([0.8, 0.8, 1.1, 0.7])
+_LEAK_SHAPE = np.array([0.65, 0.8, 1.1, 0.7])
 """Parts of the load's own motion of the free markers: shift x, shift y, scale and rotation. A push
 spreads the markers about itself."""
 _LEAST_TARE_COVERAGE = 0.8
