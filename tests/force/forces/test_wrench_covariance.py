@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from camera_rig import off_centre_view
@@ -100,3 +102,26 @@ def test_the_covariance_is_the_sum_of_its_causes(sensor: Sensor, deep: bool) -> 
     found = sensor.covariance.of_motion(interpolation, filled, NOISE_PX, reading, drift)
     due = expected(sensor, filled, drift, lateral, sunk)
     np.testing.assert_allclose(found, due, atol=1e-10 * np.abs(due).max())
+
+
+def test_independent_errors_of_the_motion_add_their_own_covariances(sensor: Sensor) -> None:
+    """Two errors are not one that is as large as both, which may be of opposite sign."""
+    rng, count = np.random.default_rng(6), len(sensor.ids)
+    interpolation, none = sensor.motion.interpolation, np.zeros(0, dtype=np.intp)
+    filled = FilledMotion(rng.normal(0, 0.05, (count, 3)), none, np.zeros((0, 0)))
+    drift, nodes = sensor.drift(rng), len(sensor.motion.points_mm)
+    plain = NormalReading.given(nodes, rng.normal(0, 0.1, nodes), 0.0)
+    errors = rng.normal(0, 0.01, (3, nodes))
+
+    def of(reading: NormalReading) -> np.ndarray:
+        return sensor.covariance.of_motion(interpolation, filled, NOISE_PX, reading, drift)
+
+    without, found = of(plain), of(replace(plain, errors_mm=errors))
+    each = [of(replace(plain, errors_mm=error[None])) - without for error in errors]
+    np.testing.assert_allclose(found - without, sum(each), atol=1e-9 * np.abs(found).max())
+    hidden = np.abs(rng.normal(0, 0.01, nodes))
+    with_hidden = replace(plain, errors_mm=errors).with_error(hidden)
+    np.testing.assert_allclose(with_hidden.common_errors_mm, np.vstack([errors, hidden]))
+    np.testing.assert_allclose(with_hidden.sigma_mm, np.hypot(plain.sigma_mm, hidden))
+    alone = plain.with_error(hidden)
+    np.testing.assert_allclose(alone.common_errors_mm, [hidden])
