@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,6 +52,8 @@ def prepared_data_set(
     require_something_drawn(loaded, count)
     encoding, kept = pictures_of(pictures, quality), FrameChoice.parsed(frames)
     require_libraries(loaded, file_format, encoding)
+    with contextlib.suppress(FileNotFoundError):
+        out.stat()  # A name that is too long is refused before anything is written.
     if progress:
         progress("sensor", 0, 1)
     bundle = scene_bundle(loaded, with_light="image" in loaded.scene.observe)
