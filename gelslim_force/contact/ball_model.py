@@ -28,7 +28,8 @@ _TURNS = 32
 _SIZE_STEP, _PLACE_STEP = 0.02, 0.1
 """Steps of differences, over the radius of contact and over the node spacing."""
 _FORCE_SIGMA = 0.01
-"""Relative error of the force at a known radius: without slip it is this much larger."""
+"""Relative error of the force at a known radius, by friction that is not known: without slip the
+force is 1 to 3 % larger, by axisymmetric elements."""
 _EDGE_SIGMA = 0.3
 """Error of what the pad's edge changes, over this change."""
 _EDGE_THICKNESSES = 1.0
@@ -87,7 +88,7 @@ class BallModel:
     def prepare(self) -> None:
         """Compute now what the first contact would wait for."""
         self.mesh.prepare()
-        assert self._table.holds(self.ball_mm / 2)
+        _ = self._table, self._edge
 
     def motion(
         self, patch: ContactPatch, indenter: Indenter, depth_mm: float | None = None

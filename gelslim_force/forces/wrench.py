@@ -9,7 +9,7 @@ given here is an upper estimate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,38 +137,31 @@ class WrenchNoise:
         rows = [interpolation.transposed(self.response[:, :, i].T) for i in (0, 1)]
         return np.stack([r.T for r in rows], axis=2)
 
-    def covariance(
-        self,
-        gains: Array,
-        sigma: Array,
-        normal_sigma_mm: Array | None = None,
-        lateral: Array | None = None,
-    ) -> Array:
+    def covariance(self, gains: Array, sigma: Array, common: Sequence[Array] = ()) -> Array:
         """Covariance (6, 6) of the wrench in N and N mm.
 
         Args:
             gains: (6, n, 2) wrench per motion of each marker, in px or mm.
             sigma: (n,) standard deviation of a coordinate of each marker, in the same unit.
-            normal_sigma_mm: (c,) standard deviation of the normal motion. The errors of all nodes
-                are fully correlated: a depth that is too large is too large everywhere.
-            lateral: (n, 2) change of the markers' lateral motion with the same error, in the unit
-                of the gains: their apparent motion is taken off for a depth that is wrong or
-                unknown.
+            common: (6,) changes of the wrench by errors that nodes and markers have in common, as
+                `by_error` gives them; these errors do not depend on each other.
         """
         noise = gains.reshape(6, -1) * np.repeat(sigma, 2)
-        common = self.common(gains, normal_sigma_mm, lateral)
-        return np.asarray(noise @ noise.T + np.outer(common, common))
+        return np.asarray(noise @ noise.T + sum(np.outer(change, change) for change in common))
 
-    def common(
-        self, gains: Array, normal_mm: Array | None = None, lateral: Array | None = None
-    ) -> Array:
-        """(6,) change of the wrench by one error at all nodes and markers, as in `covariance`."""
-        found = np.zeros(6)
+    def by_error(self, gains: Array, normal_mm: Array | None, lateral: Array) -> Array:
+        """(6,) change of the wrench by an error of the normal motion.
+
+        Args:
+            gains: (6, n, 2) as in `covariance`.
+            normal_mm: (c,) the error at the nodes; None where the motion is unknown.
+            lateral: (n, 2) change of the markers' lateral motion with it, in the unit of the gains:
+                their apparent motion is taken off for a depth that is wrong or unknown.
+        """
+        found = gains.reshape(6, -1) @ lateral.reshape(-1)
         if normal_mm is not None:
-            found += self.response[:, :, 2] @ normal_mm
-        if lateral is not None:
-            found += gains.reshape(6, -1) @ lateral.reshape(-1)
-        return found
+            found = found + self.response[:, :, 2] @ normal_mm
+        return np.asarray(found)
 
     def wrench(self, force_n: Array, covariance: Array) -> Wrench:
         """Wrench of nodal forces (c, 3); NaN for what an unknown normal motion leaves open."""

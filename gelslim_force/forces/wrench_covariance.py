@@ -73,16 +73,19 @@ class WrenchCovariance:
         sigma = np.full(gains.shape[1], noise_px)
         sigma[filled.unseen] = 0.0
         if reading is not None and reading.known:
-            found = self._wrench.covariance(gains, sigma)
-            for error_mm in reading.common_errors_mm:
-                if error_mm.any():
-                    lateral = self._in_px(self._motion.compensation_change(error_mm))
-                    common = self._wrench.common(gains, error_mm, lateral)
-                    found += np.outer(common, common)
+            common = [
+                self._wrench.by_error(
+                    gains, error_mm, self._in_px(self._motion.compensation_change(error_mm))
+                )
+                for error_mm in reading.common_errors_mm
+                if error_mm.any()
+            ]
+            found = self._wrench.covariance(gains, sigma, common)
             return rigid + found + self._hidden(reading.hidden_n)
         noise_mm = noise_px * self._motion.view.usual_mm_per_px
         apparent = self._motion.apparent_motion(filled.motion_mm, self._unknown_normal_mm, noise_mm)
-        return rigid + self._wrench.covariance(gains, sigma, lateral=self._in_px(apparent))
+        hidden = self._wrench.by_error(gains, None, self._in_px(apparent))
+        return rigid + self._wrench.covariance(gains, sigma, [hidden])
 
     def _in_px(self, motion_mm: Array) -> Array:
         """(n, 2) motion in the picture of the followed markers, for motions (k, 2) of all."""

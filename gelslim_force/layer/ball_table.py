@@ -15,8 +15,8 @@ _SIZES, _RINGS = 32, 16
 _LEAST, _MOST = 0.03, 0.9
 """Smallest and largest radius of contact, over that of the ball."""
 _HELD = 0.75
-"""Motion of the rim outwards over that without friction: half way between no slip, at which it is
-half of that, and none."""
+"""Motion of the rim over that of a contact without friction. Without slip it is about 0.5; friction
+is not known, so that the middle between 0.5 and 1 is taken."""
 _HELD_SIGMA = 0.25
 _PASSES = 3
 

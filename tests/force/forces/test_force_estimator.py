@@ -130,7 +130,8 @@ def test_uncertain_depth_adds_to_the_normal_force(case) -> None:
     gains = noise.gains(bundle.markers.sparse)
     nothing = np.zeros(gains.shape[1])
     sigma = np.abs(moved[:, 2]) * 0.1
-    found = noise.covariance(gains, nothing, sigma)
+    still = np.zeros(gains.shape[1:])
+    found = noise.covariance(gains, nothing, [noise.by_error(gains, sigma, still)])
     shift = np.zeros_like(moved)
     shift[:, 2] = sigma
     assert found[2, 2] == pytest.approx(operator.force(shift).sum(axis=0)[2] ** 2, rel=1e-5)

@@ -71,7 +71,7 @@ def test_covariance_is_the_sum_over_markers_and_correlated_errors() -> None:
     sunk = wrench_of(np.column_stack([np.zeros((NODES, 2)), deep]))
     shifted = sum(each[:, k, i] * aside[k, i] for k in range(MARKERS) for i in range(2))
     np.testing.assert_allclose(
-        noise.covariance(gains, sigma, deep, aside),
+        noise.covariance(gains, sigma, [noise.by_error(gains, deep, aside)]),
         expected + np.outer(sunk + shifted, sunk + shifted),
         rtol=1e-9,
     )
