@@ -214,7 +214,7 @@ class ForcePipeline:
             return numbered(problems=(*problems, refused))
         size = len(self.points_mm)
         given = None if normal_mm is None else NormalReading.given(size, normal_mm, normal_sigma_mm)
-        reading, motion = self._contact.of(image, drift.positions_px, tracks.tracked, given, clock)
+        reading, motion = self._contact.of(image, drift, tracks.tracked, given, clock)
         self._drift.loaded = self._motion.loaded(reading)
         if reading is not None and not reading.known:
             problems = (*problems, reading.problem)

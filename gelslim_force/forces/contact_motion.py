@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,21 @@ from gelslim_force.forces import frame_problems
 from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.motion.unseen_motion import UnseenMotion
+from gelslim_force.tracking.drift_filter import FrameDrift
 
 Array = NDArray[np.float64]
 _SHIFT_MM = 0.03
 """Change of the lateral motion in the contact for which the normal motion need not be redone."""
 _MOST_COVERED = 0.25
 """Share of the nodes in contact at which the markers may be missing."""
+
+
+@runtime_checkable
+class SeesDrift(Protocol):
+    """A source that reckons with what the correction of drift takes off the motion by a load."""
+
+    def look_corrected(self, image: NDArray[np.uint8], drift: FrameDrift) -> Any:
+        """As `NormalSource.look`, of a frame with this drift."""
 
 
 class ContactMotion:
@@ -50,7 +59,7 @@ class ContactMotion:
     def of(
         self,
         image: NDArray[np.uint8],
-        positions_px: Array,
+        drift: FrameDrift,
         tracked: NDArray[np.bool_],
         given: NormalReading | None,
         clock: FrameClock,
@@ -59,17 +68,21 @@ class ContactMotion:
 
         Args:
             image: The frame.
-            positions_px: (n, 2) markers in it; NaN for lost ones.
+            drift: Of it, with the positions of its markers.
             tracked: (n,) those that were seen.
             given: Normal motion that takes the place of the source's.
             clock: Takes the times of the stages.
         """
-        motion_of, normal = self._motion.of_markers, self._normal
+        motion_of, normal, positions_px = self._motion.of_markers, self._normal, drift.positions_px
         if given is not None or normal is None:
             motion = motion_of(positions_px, given)
             clock.stage("displace")
             return given, motion
-        seen: Any = normal.look(image, positions_px)
+        seen: Any
+        if isinstance(normal, SeesDrift):
+            seen = normal.look_corrected(image, drift)
+        else:
+            seen = normal.look(image, positions_px)
         clock.stage("look")
         reading = normal.motion(seen, self._last_lateral)
         clock.stage("normal")

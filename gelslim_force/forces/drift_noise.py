@@ -41,4 +41,5 @@ class DriftNoise:
 
     def covariance(self, drift: FrameDrift) -> Array:
         """(6, 6) of the wrench for what remains of the drift, in N and N mm."""
-        return np.asarray(self.rigid @ drift.covariance @ self.rigid.T)
+        remaining = drift.covariance + np.diag(drift.leak)
+        return np.asarray(self.rigid @ remaining @ self.rigid.T)

@@ -16,6 +16,8 @@ from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 
 Array = NDArray[np.float64]
 
+_LEAK_UNKNOWN = 0.4
+"""Part that a model of the gel does not tell of what a load moves the markers far away."""
 _HIDDEN_SHEAR = 0.2
 """Usual tangential force of a contact over its normal force."""
 
@@ -49,14 +51,16 @@ class WrenchCovariance:
         """(6, 6) in N and N mm for forces that the normal source found itself.
 
         They rest on the markers near the contact. A drift of the picture therefore changes them
-        less than forces that follow from the motion of all markers.
+        less than forces that follow from the motion of all markers. Such a source knows how the
+        load moves the markers from which the drift follows, but for errors of its model.
         """
         assert reading.forces is not None
         besides = self._wrench.response[:, :, 2] @ reading.sigma_mm
         rigid = np.einsum("ani,nip->ap", reading.forces.by_marker, self._field.basis)
         corrected = noise_px * (rigid @ drift.gain.reshape(4, -1))
         found = reading.forces.covariance + np.outer(besides, besides)
-        return np.asarray(found + rigid @ drift.covariance @ rigid.T + corrected @ corrected.T)
+        remaining = drift.covariance + _LEAK_UNKNOWN**2 * np.diag(drift.leak)
+        return np.asarray(found + rigid @ remaining @ rigid.T + corrected @ corrected.T)
 
     def of_motion(
         self,

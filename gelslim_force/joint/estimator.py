@@ -31,7 +31,8 @@ from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, JointF
 from gelslim_force.joint.light.rows import LightRows
 from gelslim_force.joint.light.sums import LightSums, placed_bins
 from gelslim_force.joint.light.view import LightView, SeenLight
-from gelslim_force.joint.marker_rows import MarkerRows, rms_length
+from gelslim_force.joint.markers.rows import MarkerRows, rms_length
+from gelslim_force.joint.markers.taken_drift import TakenDrift
 from gelslim_force.joint.model_errors import edge_nodes, wrench_spread
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
@@ -44,6 +45,7 @@ from gelslim_force.joint.rounds import Steps, finished, solutions
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.strained_gel import Excess, StrainedGel
 from gelslim_force.motion.marker_motion import MarkerRays, MarkerView
+from gelslim_force.tracking.drift_filter import FrameDrift
 from gelslim_optics.light.light_law import LightLaw
 from ifem_export.operators.adjoint_fields import rigid_motions
 
@@ -83,7 +85,6 @@ class JointEstimator:
         deep_mm: Depth from which a contact is deep.
         finer: The surface between the nodes, as the light sees it; None for cubic convolution.
         pressure: Normal forces at half the pitch; None for those on the nodes alone.
-        finer_to_mm: Depth of a contact beyond which its forces are on the nodes alone.
     """
 
     points_mm: Array
@@ -107,21 +108,28 @@ class JointEstimator:
     deep_mm: float = math.inf
     finer: FinerSurface | None = None
     pressure: FinerPressure | None = None
-    finer_to_mm: float = math.inf
 
-    def frame(self, image: NDArray[np.uint8], markers_px: Array, noise_px: float) -> FrameData:
+    def frame(
+        self,
+        image: NDArray[np.uint8],
+        markers_px: Array,
+        noise_px: float,
+        drift: FrameDrift | None = None,
+    ) -> FrameData:
         """Data of a frame.
 
         Args:
             image: (h, w, 3) uint8; not looked at without light.
             markers_px: (n, 2) followed markers; NaN for lost ones.
             noise_px: Standard deviation of their positions.
+            drift: That the markers are corrected for; None for none.
 
         Raises:
             LostColourError: The picture is grey where the rest has colour.
         """
         seen = None if self.light is None else self.light.look(image, markers_px)
-        return FrameData(seen, MarkerRays(self.markers, markers_px), noise_px)
+        taken = None if drift is None else TakenDrift.of(drift, self.markers.mm_per_px)
+        return FrameData(seen, MarkerRays(self.markers, markers_px), noise_px, taken)
 
     def estimate(self, frame: FrameData, last: JointForces | None = None) -> JointForces | None:
         """Forces of a frame, after those of the frame before; None where no contact is seen.
@@ -179,7 +187,7 @@ class JointEstimator:
         excess, near = self.excess(state), np.zeros(len(self.points_mm), dtype=bool)
         near[nodes] = True
         moved = state.linear_mm(nodes, near) + excess.moved_mm
-        markers = self.marker_rows(frame, near, moved)
+        markers = self.marker_rows(frame, nodes, moved, state.force_n[nodes])
         data = NormalEquations.of(3 * len(nodes))
         data = data.with_rows(markers.rows, markers.residual, markers.weight)
         light, heights = self.light_sums(frame, near, moved, state), None
@@ -233,25 +241,47 @@ class JointEstimator:
             return state.motion.excess
         return self.strained.excess(state.displacement_mm, state.force_n, state.motion.excess)
 
-    def marker_rows(self, frame: FrameData, near: Mask, moved_mm: Array) -> MarkerRows:
+    def marker_rows(
+        self, frame: FrameData, nodes: Nodes, moved_mm: Array, force_n: Array
+    ) -> MarkerRows:
         """The markers near the contact: lateral motion by the picture and the height.
 
         What is not resolved: a share of the motion of all, and of each marker's `bending`.
+
+        Args:
+            frame: The data.
+            nodes: (p,) in contact.
+            moved_mm: (c, 3) motion of the surface nodes.
+            force_n: (p, 3) forces that cause it.
         """
         from gelslim_force.joint.kernels.fit_kernel import sparse_rows
 
         chosen = self.settings
+        near = np.zeros(len(self.points_mm), dtype=bool)
+        near[nodes] = True
         wide = self.lattice.widened(near, chosen.marker_reach)
         used = np.flatnonzero(wide[self.marker_node] & frame.markers.known)
         model, bent = np.empty((2, len(self.markers), 3))
         for matrix, found in ((self.nodes_to_markers, model), (self.bending, bent)):
             sparse_rows(matrix.indptr, matrix.indices, matrix.data, used, moved_mm, found)
+        rows = self.responses.of_markers(nodes, used)
         lateral = frame.markers.lateral(used, model[used, 2])
-        rows = self.responses.of_markers(np.flatnonzero(near), used)
+        lateral -= self.responses.beyond_mesh(nodes, force_n, used)
         share = chosen.marker_share * rms_length(model[used])
         errors = math.hypot(chosen.marker_mm, share), chosen.bending_share, _MARKER_LIMIT
         motion = model, bent, self.by_height, frame.noise_mm
-        return MarkerRows.of(used, rows, lateral, motion, errors)
+        data = MarkerRows.of(used, rows, lateral, motion, errors)
+        if frame.taken is None:
+            return data
+        free = frame.taken.markers
+        rows = self.responses.of_markers(nodes, free)
+        return frame.taken.off(data, rows, self.shown_motion(free, nodes, moved_mm, force_n))
+
+    def shown_motion(self, markers: Nodes, nodes: Nodes, moved_mm: Array, force_n: Array) -> Array:
+        """(k, 2) lateral motion of markers (k,) as a picture shows it; see `marker_rows`."""
+        model = self.nodes_to_markers[markers] @ moved_mm
+        lateral = model[:, :2] - self.by_height[markers] * model[:, 2:]
+        return np.asarray(lateral + self.responses.beyond_mesh(nodes, force_n, markers))
 
     def light_sums(
         self, frame: FrameData, near: Mask, moved_mm: Array, state: FitState, finer_mm: Any = None

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from gelslim_force.joint.light.rows import LightRows
 from gelslim_force.joint.light.view import SeenLight
-from gelslim_force.joint.marker_rows import MarkerRows
+from gelslim_force.joint.markers.rows import MarkerRows
+from gelslim_force.joint.markers.taken_drift import TakenDrift
 from gelslim_force.joint.normal_equations import Linearised, NormalEquations
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.strained_gel import Excess
@@ -28,11 +29,13 @@ class FrameData:
         seen: Its light; None where the markers alone are used.
         markers: Rays of the followed markers.
         noise_px: Standard deviation of their positions.
+        taken: What the correction of drift takes off their motion; None where none is corrected.
     """
 
     seen: SeenLight | None
     markers: MarkerRays
     noise_px: float
+    taken: TakenDrift | None = None
 
     @property
     def noise_mm(self) -> Array:

@@ -21,7 +21,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 if TYPE_CHECKING:
     from gelslim_force.joint.light.sums import LightSums
-    from gelslim_force.joint.marker_rows import MarkerRows
+    from gelslim_force.joint.markers.rows import MarkerRows
 from gelslim_force.joint.strained_gel import Excess
 
 Array = NDArray[np.float64]

@@ -78,7 +78,7 @@ class _Refinement:
         light = estimator.light_sums(frame, _mask(start, nodes), moved, state, height)
         assert light is not None
         heights = pressure.by_force(responses, light.nodes, parts)
-        markers = estimator.marker_rows(frame, _mask(start, bearing), moved)
+        markers = estimator.marker_rows(frame, bearing, moved, start[bearing])
         markers = replace(markers, rows=pressure.in_parts(markers.rows, parts))
         gain = 1 - state.gain, estimator.settings.gain_sigma
         equations = NormalEquations.of(parts.size)

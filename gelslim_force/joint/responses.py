@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.layer.beyond_mesh import NearMotion
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
@@ -23,16 +24,24 @@ class Responses:
         compliance: Of the pad's surface.
         nodes_to_markers: (n, c) interpolation.
         by_height: (n, 2) lateral motion that a picture shows per mm less of a marker's height.
+        beyond: What the mesh leaves out near a force, and the places (n, 2) of the markers at rest;
+            None to leave it out.
     """
 
     def __init__(
-        self, compliance: SurfaceCompliance, nodes_to_markers: Any, by_height: Array
+        self,
+        compliance: SurfaceCompliance,
+        nodes_to_markers: Any,
+        by_height: Array,
+        beyond: tuple[NearMotion, Array] | None = None,
     ) -> None:
         self.compliance = compliance
         self._to_markers = nodes_to_markers
         self._by_height = by_height.astype(np.float32)
+        self._beyond = beyond
         markers, nodes = nodes_to_markers.shape
         self._markers = np.zeros((markers, 2, nodes, 3), dtype=np.float32)
+        self._beyond_mesh = np.zeros_like(self._markers) if beyond else None
         self._heights = np.zeros((nodes, nodes, 3), dtype=np.float32)
         self._made = np.zeros(nodes, dtype=bool)
 
@@ -53,6 +62,19 @@ class Responses:
         rows = np.empty((2 * len(markers), 3 * len(nodes)), dtype=np.float32)
         gather_markers(self._markers, markers, nodes, rows)
         return rows
+
+    def beyond_mesh(self, nodes: Nodes, force_n: Array, markers: Nodes) -> Array:
+        """(m, 2) what markers (m,) move more than the nodes about them, as a picture shows it.
+
+        It is under forces (p, 3) on nodes (p,), whose columns are known.
+        """
+        from gelslim_force.joint.kernels.light_kernel import add_markers
+
+        found = np.zeros((len(markers), 2))
+        if self._beyond_mesh is not None:
+            force = np.ascontiguousarray(force_n, dtype=float)
+            add_markers(self._beyond_mesh, markers, np.asarray(nodes), force, found)
+        return found
 
     def of_heights(self, nodes: Nodes, near: Nodes) -> Single:
         """(m, 3p) heights of the nodes `near` (m,) under forces on nodes (p,)."""
@@ -77,4 +99,17 @@ class Responses:
             lean = self._by_height[:, :, None, None]
             self._markers[:, :, part] = moved[:, :2] - lean * moved[:, 2:].astype(np.float32)
             self._heights[:, part] = columns[..., 2].transpose(2, 0, 1)
+            self._add_beyond(part)
             self._made[part] = True
+
+    def _add_beyond(self, nodes: Nodes) -> None:
+        if self._beyond is None or self._beyond_mesh is None:
+            return
+        near, markers_mm = self._beyond
+        points = np.asarray(self.compliance.bundle.mesh.surface_mm)[nodes, :2]
+        away = markers_mm[:, None] - points
+        marker, node = np.nonzero((np.abs(away) < near.reach_mm).all(axis=2))
+        moved = near.at(away[marker, node])
+        seen = moved[:, :2] - self._by_height[marker, :, None] * moved[:, 2:]
+        self._beyond_mesh[marker, :, nodes[node]] = seen
+        self._markers[marker, :, nodes[node]] += seen.astype(np.float32)

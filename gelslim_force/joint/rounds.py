@@ -90,16 +90,13 @@ def _last_rounds(estimator: JointEstimator, frame: FrameData, begun: Estimate) -
         yield
         state = estimator.solution(frame, np.flatnonzero(nodes), state)
     nodes, deep = estimator.pressing(nodes, state), estimator.deepness(state) > 0
-    too_deep = state.depth_mm > estimator.finer_to_mm
-    if too_deep or (deep and is_far):
+    if deep and is_far:
         nodes, state = yield from _rounds(estimator, frame, (nodes, state), rounds[1:])
     elif deep and state.share_beside(nodes) > _LOST:
         yield
         some = np.flatnonzero(nodes)
         held = _held(estimator, state, some, _HELD_BETWEEN)
         state = estimator.solution(frame, some, state) if held is None else held
-    if too_deep:
-        return nodes, state
     yield
     return nodes, refined(estimator, frame, np.flatnonzero(nodes), state)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -27,16 +26,17 @@ from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import MARKERS_ALONE, JointSettings
 from gelslim_force.joint.strained_gel import StrainedGel
 from gelslim_force.joint.unknown_shape import UnknownShape
+from gelslim_force.layer.beyond_mesh import (
+    EndlessLayers,
+    NearMotion,
+    finer_response,
+    half_step_response,
+)
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.compliance.compliance_change import ComplianceChange
-from ifem_export.compliance.finer_response import (
-    EndlessLayers,
-    finer_response,
-    half_step_response,
-)
 from ifem_export.markers.interpolation import marker_to_node
 from ifem_export.mesh.surface_lattice import neighbour_matrix, surface_share_mm2
 
@@ -44,8 +44,6 @@ if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
-_FINER_TO = 1.6
-"""Depth to which a linear gel is fitted at half the pitch, over that from which it is deep."""
 
 
 def unknown_shape(
@@ -94,13 +92,15 @@ def unknown_shape(
     seen = None
     if reference is not None:
         seen = _light_view(bundle, calibration, reference, lattice, light)
-    finer = None if seen is None else _finer_pressure(bundle, lattice)
+    layers, compliance = EndlessLayers.of(bundle), SurfaceCompliance(bundle, skin=skin)
+    finer = None if seen is None else _finer_pressure(layers, lattice)
+    discs = NearMotion.of(layers, _disc_mm(calibration, view))
     estimator = JointEstimator(
         points_mm,
         surface_share_mm2(bundle.mesh),
         neighbour_matrix(points_mm, cell_mm),
         lattice,
-        Responses(SurfaceCompliance(bundle, skin=skin), to_markers, by_height),
+        Responses(compliance, to_markers, by_height, (discs, view.rest_mm[:, :2])),
         view,
         to_markers,
         lattice.interpolation(view.rest_mm) - to_markers,
@@ -112,8 +112,6 @@ def unknown_shape(
         chosen,
         finer=None if finer is None else finer.surface,
         pressure=finer if chosen.finer_pressure else None,
-        # What a linear gel has wrong in deep contacts is not to be found between the nodes.
-        finer_to_mm=_FINER_TO * deep_mm(bundle),
     )
     estimator = replace(estimator, off_design=_off_design(bundle, estimator, calibration, more))
     if seen is None:
@@ -143,14 +141,12 @@ def _strained(bundle: Bundle, gel: str, linear: JointEstimator) -> JointEstimato
         strained=StrainedGel.of(bundle, deep_mm(bundle) if gel == "auto" else 0.0),
         relief=relief,
         deep_mm=deep_mm(bundle),
-        finer_to_mm=math.inf,
     )
 
 
-def _finer_pressure(bundle: Bundle, lattice: NodeLattice) -> FinerPressure:
-    layers = EndlessLayers.of(bundle)
-    surface = FinerSurface.of(lattice, finer_response(bundle, layers))
-    return FinerPressure.of(surface, half_step_response(bundle, layers))
+def _finer_pressure(layers: EndlessLayers, lattice: NodeLattice) -> FinerPressure:
+    surface = FinerSurface.of(lattice, finer_response(layers))
+    return FinerPressure.of(surface, half_step_response(layers))
 
 
 def _cell_share(bundle: Bundle) -> float:
@@ -195,17 +191,27 @@ def _light_view(
     lattice: NodeLattice,
     light: LightCalibration | None,
 ) -> LightView:
-    followed = calibration.reference
-    radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
     return LightView(
         calibration.camera,
         upright(reference, calibration.camera),
-        followed.positions_px,
-        radius_px[np.searchsorted(calibration.markers, followed.markers)],
+        calibration.reference.positions_px,
+        _radii_px(calibration),
         lattice,
         _traced(bundle),
         light,
     )
+
+
+def _radii_px(calibration: Calibration) -> Array:
+    """(n,) of the dots of the followed markers."""
+    radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
+    followed = np.searchsorted(calibration.markers, calibration.reference.markers)
+    return np.asarray(radius_px[followed])
+
+
+def _disc_mm(calibration: Calibration, view: MarkerView) -> float:
+    """Radius of most dots: the mean motion of a dot is what its centre shows."""
+    return float(np.median(_radii_px(calibration) * view.mean_mm_per_px))
 
 
 def layer_stiffness_n_mm(bundle: Bundle) -> float:

@@ -85,7 +85,7 @@ class JointSettings:
     light_error: float = 0.015
     light_share: float = 0.05
     deep_light_share: float = 0.2
-    height_share: float = 0.07
+    height_share: float = 0.06
     edge_share: float = 0.05
     gain_sigma: float = 0.2
     gamma: float = USUAL_GAMMA
@@ -97,7 +97,7 @@ class JointSettings:
     unseen_force: float = 0.2
     unseen_by_markers: float = 0.5
     most_sigma: float = 0.4
-    least_pressure: float = 0.2
+    least_pressure: float = 0.3
     deep_least_pressure: float = 0.25
     light_reach: int = 2
     marker_reach: int = 6

@@ -15,9 +15,10 @@ from gelslim_force.contact.normal_source import FoundForces, NormalReading
 from gelslim_force.contact.shading_change import MOST_FAINT, TOO_FAINT, LostColourError
 from gelslim_force.joint.estimator import JointEstimator
 from gelslim_force.joint.fit_state import FrameData, JointForces
-from gelslim_force.joint.marker_misfit import with_hidden, with_misfit
+from gelslim_force.joint.markers.misfit import with_hidden, with_misfit
 from gelslim_force.joint.rounds import Steps, finished
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
+from gelslim_force.tracking.drift_filter import FrameDrift
 from gelslim_force.tracking.marker_noise import noise_px
 from ifem_export.errors import IfemError
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
@@ -98,14 +99,20 @@ class UnknownShape:
         """
         return finished(self.looking(image, markers_px))
 
+    def look_corrected(
+        self, image: NDArray[np.uint8], drift: FrameDrift
+    ) -> JointForces | str | None:
+        """`look` at a frame whose markers are corrected for a drift."""
+        return finished(self.looking(image, drift.positions_px, drift))
+
     def looking(
-        self, image: NDArray[np.uint8], markers_px: Array
+        self, image: NDArray[np.uint8], markers_px: Array, drift: FrameDrift | None = None
     ) -> Steps[JointForces | str | None]:
         """`look`, which stops before each solution; no other frame is looked at before it ends."""
         noise = noise_px(self.reference, markers_px - self.reference.positions_px)
         last, self._last = self._last, None
         try:
-            frame = self.estimator.frame(image, markers_px, noise)
+            frame = self.estimator.frame(image, markers_px, noise, drift)
             self._faint = 1.0 if frame.seen is None else frame.seen.shading.faint
             if self._faint > MOST_FAINT:
                 return TOO_FAINT
@@ -117,7 +124,7 @@ class UnknownShape:
             return str(error)
         if found is None or self._explains(found):
             if found is not None:
-                found = with_misfit(self.estimator, found, markers_px, noise)
+                found = with_misfit(self.estimator, found, frame)
                 more_n = self.unseen_n - self._usually_unseen_n
                 found = with_hidden(self.estimator, found, more_n)
             self._last = found

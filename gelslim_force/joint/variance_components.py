@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from gelslim_force.joint.marker_rows import MarkerRows
+from gelslim_force.joint.markers.rows import MarkerRows
 
 Array = NDArray[np.float64]
 

@@ -75,6 +75,13 @@ class LayerResponse:
         """M (n,) of a half-space in the same skin."""
         return np.asarray(self.rigid_limit / (1 + self.skin_length_mm * wave))
 
+    def by_wave(self, wave: Array) -> tuple[Array, Array, Array]:
+        """L, M and N of the layer in its skin for waves of any shape, above 0."""
+        sinking, outward, along = _bare(wave * self.thickness_mm, self.poissons_ratio)
+        held = self.skin_length_mm * wave
+        free = 1 + held * along
+        return sinking - held * outward**2 / free, outward / free, along / free
+
     def along(self, wave: Array) -> Array:
         """N (n,) of the layer in its skin."""
         found = _bare(wave * self.thickness_mm, self.poissons_ratio)[2]

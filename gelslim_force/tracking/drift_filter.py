@@ -113,8 +113,10 @@ class FrameDrift:
         similarity: Estimated drift since the calibration.
         positions_px: (n, 2) markers without the drift that is corrected.
         gain: (4, n, 2) part of each marker's noise in the drift that is corrected.
+        basis: (n, 2, 4) motion of the markers per unit of drift.
         covariance: (4, 4) of the remaining drift (shift x, shift y, scale, rotation), beside that
-            noise.
+            noise and what the load moves the free markers.
+        leak: (4,) variances of it by what the load moves the free markers.
         problem: Why no forces can be given; empty if they can.
         untouched: Whether the markers show no contact.
         residual_px: Of the free markers; NaN where none are free.
@@ -123,7 +125,9 @@ class FrameDrift:
     similarity: Similarity
     positions_px: Array
     gain: Array
+    basis: Array
     covariance: Array
+    leak: Array
     problem: str
     untouched: bool
     residual_px: float
@@ -200,7 +204,7 @@ class DriftFilter:
         self._covariance = self._covariance + self._walk
         if found is None:
             self._still = []
-            return self._found(tracks, None, np.zeros((4, len(tracks), 2)), self._remaining())
+            return self._found(tracks, None, np.zeros((4, len(tracks), 2)), self._covariance)
         from gelslim_force.tracking.drift_filter_kernel import combined, left_over
 
         solution = self.field.solution(found).reshape(4, -1)
@@ -219,8 +223,8 @@ class DriftFilter:
         weight = (share[0, 0] + share[1, 1]) / 2
         self._bias_px = weight * found.leak_px + (1 - weight) * self._bias_px
         self._covariance = left_over(self._covariance, share)
-        remaining = self._remaining()
-        self._covariance = self._covariance + noise**2 * (gain @ gain.T)
+        remaining = self._covariance
+        self._covariance = remaining + noise**2 * (gain @ gain.T)
         return self._found(tracks, found, gain.reshape(4, -1, 2), remaining)
 
     def _remaining(self) -> Array:
@@ -295,7 +299,9 @@ class DriftFilter:
                 tracks.positions_px, Similarity.of(self._drift.vector - left)
             ),
             gain=share * gain,
+            basis=self.field.basis,
             covariance=covariance + left[:, None] * left,
+            leak=self._leak(self._bias_px),
             problem=self._excess(),
             untouched=found is not None and found.untouched and not np.any(self.loaded),
             residual_px=float("nan") if found is None else found.residual_px,

@@ -2,11 +2,13 @@
 
 The renderer is that of the tests; dots are strained with the surface, and slopes are those of the
 deformed surface. Modulus and gain of the light are drawn within the tolerances of `sigma_cases`,
-and so were thickness and Poisson's ratio when the contacts were solved.
+and so were thickness and Poisson's ratio when the contacts were solved. What the mesh leaves out
+of the motion near the forces is added, by the linear law.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Literal
 
@@ -14,6 +16,7 @@ import numpy as np
 from camera_rig import off_centre_view
 from deep_contacts import DeepContact, deep_contact, finer_pad
 from guided_light import guided_bundle, irradiance
+from near_forces import NearForces
 from numpy.typing import NDArray
 from pressed_samples import Pressed, calibration, surface_splines
 from scipy.interpolate import RectBivariateSpline
@@ -54,8 +57,11 @@ def deep_picture(seed: int, light: Light = "guided") -> Pressed:
     rng = np.random.default_rng([42, seed])
     young, gain = np.exp(rng.normal(0, (MODULUS_SIGMA, LIGHT_GAIN)))
     contact = deep_contact(seed)
-    points = np.asarray(finer_pad(contact.case.thickness).surface_mm)
-    splines = surface_splines(points, contact.moved_mm)
+    mesh = finer_pad(contact.case.thickness)
+    points = np.asarray(mesh.surface_mm)
+    gel = replace(sensor_bundle().material, poissons_ratio=contact.case.poissons_ratio)
+    missing = NearForces(mesh, gel).missing(contact.force_n)
+    splines = surface_splines(points, contact.moved_mm + missing)
 
     def motion(places_mm: Array) -> Array:
         return np.column_stack([s.ev(*places_mm.T) for s in splines])

@@ -147,7 +147,7 @@ def press(seed: int, wide: bool = False) -> Contact:
     load = press_load(seed, wide)
     gel, gain, force = load.gel, load.light_gain, load.force_n
     pad = fine_pad(gel.thickness, gel.poissons_ratio)
-    moved = pad.operator.displacement(force / gel.young)
+    moved = pad.displacement(force / gel.young)
     splines = surface_splines(pad.points_mm, moved)
 
     def motion(places_mm: Array) -> Array:
@@ -168,8 +168,9 @@ def ball(seed: int) -> Contact:
 def ball_on(gel: MadeGel, gain: float, rng: np.random.Generator) -> Contact:
     """A ball that pushes, sticking or not, and shears by friction.
 
-    The tangential tractions are those of a layer; the antisymmetric heights that they cause are
-    left out, because the ball levels them by a pressure without a resultant.
+    The motion under the push is that of an endless layer, and what the edges of the pad add to it
+    under Hertz's pressure. The tangential tractions are those of a layer; the antisymmetric heights
+    that they cause are left out, because the ball levels them by a pressure without a resultant.
     """
     ball_mm = float(rng.choice(RADII_MM))
     nominal = lit_bundle()
@@ -186,15 +187,17 @@ def ball_on(gel: MadeGel, gain: float, rng: np.random.Generator) -> Contact:
     share, turn = rng.uniform(0, FRICTION), rng.uniform(0, 2 * np.pi)
     shear = share * push * np.array([np.cos(turn), np.sin(turn)])
     force = np.column_stack([np.outer(pressure / pressure.sum(), shear), np.zeros(len(pressure))])
-    sheared = surface_splines(pad.points_mm, pad.operator.displacement(force / gel.young))[:2]
+    level = pad.displacement(force / gel.young) * [1, 1, 0]
+    pushes = np.column_stack([np.zeros((len(pressure), 2)), -pressure / pressure.sum() * push])
+    more = surface_splines(pad.points_mm, level + pad.by_edges(pushes / gel.young))
     out, down = CubicSpline(disc.r_mm, outward), CubicSpline(disc.r_mm, height)
 
     def motion(places_mm: Array) -> Array:
         away = places_mm - place
         r = np.minimum(np.hypot(*away.T), disc.r_mm[-2])
         lateral = away * (out(r) / np.maximum(r, 1e-9))[:, None]
-        lateral += np.column_stack([s.ev(*places_mm.T) for s in sheared])
-        return np.column_stack([lateral, down(r)])
+        found = np.column_stack([s.ev(*places_mm.T) for s in more])
+        return found + np.column_stack([lateral, down(r)])
 
     nodes = np.asarray(nominal.mesh.surface_mm)[:, :2]
     force_n = np.array([*shear, -push])
@@ -236,7 +239,7 @@ def seen(picture: Picture, condition: str, seed: int) -> Picture:
     drift = _STILL_PX * rng.normal(size=4)
     if condition == "drifting":
         drift = rng.uniform(-1, 1, 4) * _DRIFT_PX
-    image = _drifted(picture.astype(float), drift)
+    image = drifted(picture.astype(float), drift)
     if condition == "dirty":
         _soil(image, rng)
     noise = 8.0 if condition == "noisy" else 2.5
@@ -244,7 +247,7 @@ def seen(picture: Picture, condition: str, seed: int) -> Picture:
     return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
 
-def _drifted(image: Array, drift_px: Array) -> Array:
+def drifted(image: Array, drift_px: Array) -> Array:
     """Shifted along rows and columns, scaled and turned about the middle of the picture.
 
     Args:

@@ -297,6 +297,21 @@ def gather_markers(values: Any, markers: Any, nodes: Any, found: Any) -> None:
 
 
 @njit(**COMPILED)
+def add_markers(values: Any, markers: Any, nodes: Any, force: Any, found: Any) -> None:
+    """Add lateral motions of markers (n,) under forces (p, 3) on nodes (p,) to `found` (n, 2).
+
+    `values` are as for `gather_markers`.
+    """
+    for k in range(len(markers)):
+        for along in range(2):
+            row, total = values[markers[k], along], 0.0
+            for n in range(len(nodes)):
+                one = row[nodes[n]]
+                total += one[0] * force[n, 0] + one[1] * force[n, 1] + one[2] * force[n, 2]
+            found[k, along] += total
+
+
+@njit(**COMPILED)
 def add_stencils(stencil: Any, places: Any, force: Any, number: Any, found: Any) -> None:
     """Add the heights that forces (p, 3) at places (p, 2) of a lattice make around them.
 

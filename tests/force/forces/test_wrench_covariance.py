@@ -45,8 +45,11 @@ class Sensor:
         """A drift of which a part is corrected."""
         half = rng.normal(0, 0.01, (4, 4))
         gain = rng.normal(0, 0.003, (4, len(self.ids), 2))
-        drift, nothing = Similarity(), float("nan")
-        return FrameDrift(drift, self.seen_px, gain, half @ half.T, "", False, nothing)
+        leak, nothing = rng.uniform(0, 1e-5, 4), float("nan")
+        return FrameDrift(
+            Similarity(), self.seen_px, gain, self.field.basis, half @ half.T, leak, "", False,
+            nothing,
+        )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +71,8 @@ def expected(
     whole = sensor.noise.gains(sensor.motion.interpolation)
     scale, basis = sensor.motion.view.mm_per_px, sensor.field.basis
     rigid = sum(whole[:, m] @ scale[n] @ basis[n] for n, m in enumerate(sensor.ids))
-    total, common = rigid @ drift.covariance @ rigid.T, sunk.copy()
+    total = rigid @ (drift.covariance + np.diag(drift.leak)) @ rigid.T
+    common = sunk.copy()
     for n, marker in enumerate(sensor.ids):
         per_px = gains[:, marker] @ scale[n] - rigid @ drift.gain[:, n]
         common += per_px @ np.linalg.inv(scale[n]) @ lateral_mm[marker]

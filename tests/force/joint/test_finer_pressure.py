@@ -6,22 +6,22 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hertz_on_layer import RADIUS_MM, nodal_forces, true_heights
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from sensor_samples import sensor_bundle
-from test_finer_surface import RADIUS_MM, nodal_forces, true_heights
 
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.responses import Responses
-from ifem_export.compliance.columns import SurfaceCompliance
-from ifem_export.compliance.finer_response import (
+from gelslim_force.layer.beyond_mesh import (
     REACH,
     EndlessLayers,
     finer_response,
     half_step_response,
 )
+from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.inverse.contact_fit_kernel import descend_within
 from ifem_export.markers.interpolation import marker_to_node
 
@@ -35,8 +35,8 @@ def pressure() -> FinerPressure:
     layers = EndlessLayers.of(bundle)
     points = np.asarray(bundle.mesh.surface_mm)
     nodes = NodeLattice.of(points, np.asarray(bundle.mesh.cell_size_mm[:2]))
-    surface = FinerSurface.of(nodes, finer_response(bundle, layers))
-    return FinerPressure.of(surface, half_step_response(bundle, layers))
+    surface = FinerSurface.of(nodes, finer_response(layers))
+    return FinerPressure.of(surface, half_step_response(layers))
 
 
 def places_mm() -> Array:

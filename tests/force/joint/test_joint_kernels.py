@@ -14,7 +14,7 @@ from gelslim_force.joint.kernels.fit_kernel import marker_data, sparse_product, 
 from gelslim_force.joint.kernels.light_kernel import gather_heights, gather_markers, light_data
 from gelslim_force.joint.kernels.region_kernel import bins_above_noise
 from gelslim_force.joint.light.sums import LightSums, placed_bins
-from gelslim_force.joint.marker_rows import MarkerRows
+from gelslim_force.joint.markers.rows import MarkerRows
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.normal_equations import Linearised, NormalEquations, huber
 from gelslim_optics.light.light_law import SCATTERED, LightLaw

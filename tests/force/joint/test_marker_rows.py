@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gelslim_force.joint.marker_rows import MarkerRows
+from gelslim_force.joint.markers.rows import MarkerRows
 
 COUNT, UNKNOWNS, TRIALS = 60, 12, 1500
 

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.joint.deepness import deepness
 from gelslim_force.joint.estimator import JointEstimator
-from gelslim_force.joint.fit_state import JointForces
-from gelslim_force.motion.marker_motion import MarkerRays
+from gelslim_force.joint.fit_state import FrameData, JointForces
 
 Array = NDArray[np.float64]
 _INSIDE = 0.3
@@ -39,23 +38,20 @@ region sharply. With twice that noise, 0.09 px or JPEG of quality 15, the region
 and forces that may only push are a fifth too large; their error grows with the noise."""
 
 
-def with_misfit(
-    estimator: JointEstimator, found: JointForces, markers_px: Array, noise_px: float
-) -> JointForces:
+def with_misfit(estimator: JointEstimator, found: JointForces, frame: FrameData) -> JointForces:
     """The forces with a covariance that holds what the markers in the contact do not confirm.
 
     Args:
         estimator: Which found them.
         found: The forces.
-        markers_px: (n, 2) markers of the frame; NaN for lost ones.
-        noise_px: Standard deviation of their positions.
+        frame: Its data.
     """
     growth = max(
-        marker_misfit(estimator, found, markers_px, noise_px),
+        marker_misfit(estimator, found, frame),
         found.unexplained / _USUAL_UNEXPLAINED,
     )
     if estimator.light is None:
-        noise_mm = noise_px * estimator.markers.usual_mm_per_px
+        noise_mm = frame.noise_px * estimator.markers.usual_mm_per_px
         growth = max(growth, noise_mm / (_SHARP * estimator.settings.marker_mm))
     return found if growth <= 1 else replace(found, covariance=growth**2 * found.covariance)
 
@@ -77,21 +73,24 @@ def with_hidden(estimator: JointEstimator, found: JointForces, normal_n: float) 
     return replace(found, covariance=found.covariance + np.outer(hidden, hidden))
 
 
-def marker_misfit(
-    estimator: JointEstimator, found: JointForces, markers_px: Array, noise_px: float
-) -> float:
+def marker_misfit(estimator: JointEstimator, found: JointForces, frame: FrameData) -> float:
     """Root mean square residual of the markers in the contact beyond noise, over the usual one.
 
     0 where fewer than four are seen. Arguments as in `with_misfit`.
     """
     # The region is a column beside the motion, so that one product serves both.
     model = estimator.nodes_to_markers @ np.column_stack([found.displacement_mm, found.region])
-    rays = MarkerRays(estimator.markers, markers_px)
+    rays, taken = frame.markers, frame.taken
     inside = np.flatnonzero((model[:, 3] > _INSIDE) & rays.known)
     if len(inside) < _LEAST:
         return 0.0
     seen = rays.lateral(inside, model[inside, 2])
-    noise_mm = noise_px * estimator.markers.usual_mm_per_px
+    nodes = np.flatnonzero(found.force_n.any(axis=1))
+    seen -= estimator.responses.beyond_mesh(nodes, found.force_n[nodes], inside)
+    if taken is not None:
+        own = nodes, found.displacement_mm, found.force_n[nodes]
+        seen += taken.at(inside, estimator.shown_motion(taken.markers, *own))
+    noise_mm = frame.noise_px * estimator.markers.usual_mm_per_px
     by_chance = noise_mm**2 * (1 + _MOST_SIGMAS / np.sqrt(len(seen)))
     beyond = float(np.mean(np.square(seen - model[inside, :2]))) - by_chance
     deep = deepness(found.displacement_mm[:, 2], estimator.deep_mm)
