@@ -7,12 +7,13 @@ from typing import Literal, get_args
 
 from gelslim_core.budget.budget import Budget
 from gelslim_force.contact.ball_model import BallModel, contact_model
-from gelslim_force.contact.indenter import Indenter
+from gelslim_force.contact.indenter import Indenter, Sphere
 from gelslim_force.contact.normal_motion import NormalModel
 from gelslim_force.forces.contact_forces import ContactForces
 from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
 from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm, law_of
 from gelslim_force.joint.settings import USUAL_GAMMA
+from gelslim_force.layer.beyond_mesh import EndlessLayers, NearMotion
 from gelslim_force.motion.marker_motion import COMPENSATIONS, Compensation
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.tracking.drift_filter import DriftSettings
@@ -132,7 +133,11 @@ class PipelineSettings:
 
     def contact(self, bundle: Bundle, indenter: Indenter) -> NormalModel | BallModel:
         """Contact of a known indenter with the pad. Raises as `operator`."""
-        mesh = NormalModel(self.compliance(bundle), bundle.mesh.surface_mm, self.edge(bundle))
+        # The forces of a ball are those of a layer, and the mesh only tells how the surface moves.
+        ball = isinstance(indenter, Sphere)
+        near = None if ball else NearMotion.of(EndlessLayers.of(bundle), 0.0)
+        points_mm = bundle.mesh.surface_mm
+        mesh = NormalModel(self.compliance(bundle), points_mm, self.edge(bundle), near)
         return contact_model(mesh, bundle, indenter)
 
     def law(self, bundle: Bundle, operator: SurfaceOperator) -> FiniteStrainForce | DepthLaw | None:

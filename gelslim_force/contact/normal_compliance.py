@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import SuperLU
 
+from gelslim_force.layer.beyond_mesh import NearMotion
 from ifem_export.compliance.contact_columns import ContactCompliance
 from ifem_export.operators.condensed_operators import (
     CondensedOperator,
@@ -41,13 +42,18 @@ class NormalCompliance:
     They come from `displacement`. Near the edge of the pad, where a fast operator takes it for a
     periodic layer, they come from `edge`, if that is given. For an operator that holds the full
     system of the pad, they come from one factorisation with many right-hand sides: the same
-    numbers, several times faster.
+    numbers, several times faster. What the mesh leaves out near a force is added by `beyond`: it,
+    and the places (c, 2) of the nodes.
     """
 
     def __init__(
-        self, operator: Compliant, columns: int, edge: ContactCompliance | None = None
+        self,
+        operator: Compliant,
+        columns: int,
+        edge: ContactCompliance | None = None,
+        beyond: tuple[NearMotion, Array] | None = None,
     ) -> None:
-        self._operator, self._edge = operator, edge
+        self._operator, self._edge, self._beyond = operator, edge, beyond
         self._columns = columns
         self._values = np.zeros((columns, columns), dtype=np.float32)
         self._known = np.zeros(columns, dtype=bool)
@@ -95,6 +101,16 @@ class NormalCompliance:
 
     def _solved(self, nodes: Nodes) -> Array:
         """Columns (c, n)."""
+        columns = self._of_mesh(nodes)
+        if self._beyond is not None:
+            near, points = self._beyond
+            away = points[:, None] - points[nodes]
+            row, column = np.nonzero((np.abs(away) < near.reach_mm).all(axis=2))
+            columns[row, column] += near.at(away[row, column])[:, 2, 2]
+        return columns
+
+    def _of_mesh(self, nodes: Nodes) -> Array:
+        """Columns (c, n) of the mesh."""
         if self._edge is None:
             return self._fast(nodes)
         near = self._edge.ahead[nodes]

@@ -12,6 +12,7 @@ from gelslim_force.contact.indenter import Flat, Indenter
 from gelslim_force.contact.normal_compliance import Compliant, NormalCompliance
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch, rotated
+from gelslim_force.layer.beyond_mesh import NearMotion
 from ifem_export.compliance.contact_columns import ContactCompliance
 
 Array = NDArray[np.float64]
@@ -41,19 +42,25 @@ class NormalModel:
     the profile. This needs no modulus.
 
     `points_mm` (c, 3) are the surface nodes in the operator's order, on a lattice of `pitch_mm`;
-    `edge` takes the operator's place near the edge of the pad.
+    `edge` takes the operator's place near the edge of the pad, and `beyond` adds what the mesh
+    leaves out near a force.
     Not safe for use from two threads at once.
     """
 
     def __init__(
-        self, operator: Compliant, points_mm: ArrayLike, edge: ContactCompliance | None = None
+        self,
+        operator: Compliant,
+        points_mm: ArrayLike,
+        edge: ContactCompliance | None = None,
+        beyond: NearMotion | None = None,
     ) -> None:
         points = np.array(points_mm, dtype=float)
         if points.ndim != 2 or points.shape[1] < 2 or not np.isfinite(points).all():
             raise ValueError(f"surface nodes of shape {points.shape}: give (c, 3) finite, in mm")
         self.points_mm = points[:, :2]
         self.pitch_mm = _pitch(self.points_mm)
-        self.compliance = NormalCompliance(operator, len(points), edge)
+        near = None if beyond is None else (beyond, self.points_mm)
+        self.compliance = NormalCompliance(operator, len(points), edge, near)
 
     def prepare(self) -> None:
         """Compute the full compliance now, so that no frame waits for a part of it."""

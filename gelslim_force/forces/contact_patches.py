@@ -39,7 +39,8 @@ def contact_patches(field: ForceField) -> tuple[PatchForce, ...]:
 
     Nodes in contact belong together where they are neighbours along or across the lattice, or
     diagonally. The forces of a known contact sum to that of the wrench but for what is spread over
-    the rest of the surface.
+    the rest of the surface. Where nothing is, because forces act in and beside the contacts only,
+    those beside a contact belong to it.
 
     Args:
         field: Forces with the nodes in contact.
@@ -51,7 +52,10 @@ def contact_patches(field: ForceField) -> tuple[PatchForce, ...]:
     picture = np.zeros(corner, dtype=bool)
     picture[place] = field.contact
     labels, count = ndimage.label(picture, structure=np.ones((3, 3)))
-    number = np.asarray(labels)[place]
+    wide = ndimage.grey_dilation(labels, size=(3, 3))
+    number, beside = np.asarray(labels)[place], np.asarray(wide)[place]
+    if not field.force_n[beside == 0].any():
+        number = np.where(field.force_n.any(axis=1), beside, number)
     found = [_patch(field, np.flatnonzero(number == k + 1)) for k in range(count)]
     return tuple(sorted(found, key=lambda patch: np.nan_to_num(patch.force_n[2])))
 

@@ -151,7 +151,7 @@ class JointEstimator:
         """Those of the nodes (c,) that press in an estimate, and what they enclose."""
         pressure = -state.force_n[:, 2] / self.area_mm2
         least = least_pressure_at(self.settings, self.deepness(state))
-        return pressing_nodes(nodes, pressure, self.around, least)
+        return pressing_nodes(nodes, pressure, self.around, self.lattice, least)
 
     def shown(self, image: NDArray[np.uint8], markers_px: Array) -> Mask:
         """(c,) nodes whose slope the light of a frame shows; arguments and errors as in `frame`."""
@@ -279,7 +279,11 @@ class JointEstimator:
 
     def shown_motion(self, markers: Nodes, nodes: Nodes, moved_mm: Array, force_n: Array) -> Array:
         """(k, 2) lateral motion of markers (k,) as a picture shows it; see `marker_rows`."""
-        model = self.nodes_to_markers[markers] @ moved_mm
+        from gelslim_force.joint.kernels.fit_kernel import sparse_rows
+
+        matrix, every = self.nodes_to_markers, np.empty((len(self.markers), 3))
+        sparse_rows(matrix.indptr, matrix.indices, matrix.data, markers, moved_mm, every)
+        model = every[markers]
         lateral = model[:, :2] - self.by_height[markers] * model[:, 2:]
         return np.asarray(lateral + self.responses.beyond_mesh(nodes, force_n, markers))
 

@@ -34,6 +34,8 @@ _LEAST_ACROSS = 0.1
 """Sensitivity, or difference of those of two channels, that shows a slope across."""
 _GROWS_FAST = 0.1
 """Share of the nodes seen that are new in one frame and not next to those seen before."""
+_FAINT = 2 / 3
+"""Mean pressure of a contact, over that of all, below which it is judged by the latter."""
 _DENT, _LEAST_DENT = 0.25, 0.1
 """Share of a line's depth from which it is in the dent, and of the greatest depth from which a
 line counts."""
@@ -110,15 +112,20 @@ def _parts(nodes: Mask, lattice: NodeLattice) -> NDArray[np.int32]:
     return np.asarray(parts[lattice.place[:, 0], lattice.place[:, 1]])
 
 
-def pressing_nodes(region: Mask, pressure: Array, around: sparse.csr_array, least: float) -> Mask:
+def pressing_nodes(
+    region: Mask, pressure: Array, around: sparse.csr_array, lattice: NodeLattice, least: float
+) -> Mask:
     """(c,) nodes of a region that press, alone and with their neighbours.
+
+    Several contacts are judged apart, and those that press much less than the others by these.
 
     Args:
         region: (c,) nodes that may press.
         pressure: (c,) estimate, with errors from node to node.
         around: (c, c) by which a value becomes the mean of those of a node's neighbours.
-        least: Share of the mean pressure, weighted by itself, that the mean of a node and its
-            neighbours has to reach.
+        lattice: Of the nodes.
+        least: Share of the mean pressure of a contact, weighted by itself, that the mean of a node
+            and its neighbours has to reach.
 
     Returns:
         The nodes; the whole region where none presses.
@@ -126,8 +133,12 @@ def pressing_nodes(region: Mask, pressure: Array, around: sparse.csr_array, leas
     if not (pressure > 0).any():
         return region
     about = around @ pressure
-    mean = float(pressure @ pressure) / float(pressure.sum())
-    pressing = region & ((pressure + about) / 2 > least * mean)
+    part = _parts(region, lattice)
+    total = np.bincount(part, pressure)
+    mean = np.bincount(part, pressure * pressure) / np.maximum(total, 1e-300)
+    whole = float(pressure @ pressure) / float(pressure.sum())
+    limit = least * np.maximum(mean, _FAINT * whole)
+    pressing = region & ((pressure + about) / 2 > limit[part])
     return np.asarray(pressing if pressing.any() else region)
 
 

@@ -59,7 +59,8 @@ class JointSettings:
         unseen_by_markers: The same where there is no light.
         most_sigma: Standard deviation of the normal force by the markers alone, over the force,
             beyond which it is unknown.
-        least_pressure: Share of the mean pressure below which a node is taken to be free.
+        least_pressure: Share of the mean pressure of its contact below which a node is taken to be
+            free.
         deep_least_pressure: The same of a deep contact.
         light_reach: Steps along the lattice around the region whose light is used.
         marker_reach: The same for the markers.
@@ -162,7 +163,12 @@ ON_NODES = JointSettings(
 """With light, and normal forces on the nodes alone. These resolve less of the change of the light,
 and more of it is used."""
 MARKERS_ALONE = JointSettings(
-    marker_mm=0.004, shear_share=0.0, roughness=0.22, marker_reach=8, rounds=(2, 1, 1)
+    marker_mm=0.004,
+    shear_share=0.0,
+    roughness=0.22,
+    least_pressure=0.2,
+    marker_reach=8,
+    rounds=(2, 1, 1),
 )
 """Without light: markers show the region less sharply, so that more nodes have to be removed, and
 what the region leaves open is as large as 4 µm at the markers. A narrow limit of the shear is what

@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.layer.layer_response import LayerResponse
 from gelslim_force.layer.layer_motion import Places, surface_motion
+from gelslim_force.layer.layer_response import LayerResponse
 from ifem_export.compliance.node_convolution import LatticeKernel
 from ifem_export.operators.layer_elimination import layer_elimination
 from ifem_export.operators.layered_operator import even_fast_length

@@ -84,8 +84,7 @@ class LayerResponse:
 
     def along(self, wave: Array) -> Array:
         """N (n,) of the layer in its skin."""
-        found = _bare(wave * self.thickness_mm, self.poissons_ratio)[2]
-        return np.asarray(found / (1 + self.skin_length_mm * wave * found))
+        return self.by_wave(wave)[2]
 
     def skin_kernel(self, apart_mm: Array) -> Array:
         """∫ (L - shallow) cos(kv) dk of a half-space in this skin at v ≠ 0.

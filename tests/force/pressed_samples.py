@@ -234,7 +234,8 @@ def _sight() -> tuple[Array, Array]:
 def _material(splines: list[RectBivariateSpline]) -> Array:
     """(n, 2) places at rest of what the pixels see, by iteration to convergence.
 
-    Pixels at the rim may alternate between the pad and what is beside it.
+    Pixels at the rim may alternate between the pad and what is beside it, and those beside it are
+    not looked at.
     """
     rest, lean = _sight()
     material, left = rest.copy(), np.arange(len(rest))
@@ -244,7 +245,7 @@ def _material(splines: list[RectBivariateSpline]) -> Array:
         off = np.abs(found - material[left]).max(axis=1)
         material[left] = found
         left = left[off > CONVERGED_MM]
-    rim = np.abs(np.abs(material[left]) - np.array(SIZE_MM) / 2).min(axis=1)
+    rim = (np.array(SIZE_MM) / 2 - np.abs(material[left])).min(axis=1)
     far = np.abs(material[left] - rest[left]).max(initial=0.0)
     assert (rim < RIM_MM + far).all()
     return material

@@ -81,20 +81,20 @@ def pressed_shape(
     c, s = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
     dx, dy = points[:, 0] - place_mm[0], points[:, 1] - place_mm[1]
     gap = depth_mm - shape.profile(c * dx + s * dy, c * dy - s * dx)
-    push = _contact(lambda force: layer.displacement(force) + pad.near.missing(force), gap)
+    push = _contact(layer, gap)
     force = np.zeros_like(points)
     force[:, 2] = -push
-    return drawn(force, pad.displacement(force), seed)
+    return drawn(force, pad.operator.displacement(force), seed)
 
 
-def _contact(moved: Callable[[Array], Array], gap: Array) -> Array:
+def _contact(layer, gap: Array) -> Array:
     """Pushes (n,) p >= 0 with sinking >= gap where p > 0: accelerated projected gradients."""
     candidates = gap > 0
 
     def sinking(push: Array) -> Array:
         force = np.zeros((len(push), 3))
         force[:, 2] = -push
-        return -moved(force)[:, 2]
+        return -layer.displacement(force)[:, 2]
 
     probe = np.where(candidates, 1.0, 0.0)
     for _ in range(8):

@@ -147,7 +147,7 @@ def test_rest_is_no_force_in_any_noise() -> None:
 def test_random_tractions() -> None:
     """Errors where the normal force is known.
 
-    Two contacts of less than 0.08 N are not seen; the place of these, and so their torque, is not
+    Three contacts of less than 0.08 N are not seen; the place of these, and so their torque, is not
     known.
     """
     errors, scores, shear, unknown, unseen = [], [], [], 0, []
@@ -170,13 +170,13 @@ def test_random_tractions() -> None:
         if large:
             errors.append(off[2] / truth.wrench[2])
     assert unknown == 0
-    assert len(unseen) <= 2
+    assert len(unseen) <= 3
     assert (np.abs(unseen) < 2).all()
     assert np.median(np.abs(errors)) < 0.04
     assert np.percentile(np.abs(errors), 95) < 0.08
     assert np.median(shear) < 0.002
     spread = np.sqrt(np.mean(np.square(scores), axis=0))
-    assert (spread > 0.5).all()
+    assert (spread > 0.4).all()
     assert (spread < 1.3).all()
 
 

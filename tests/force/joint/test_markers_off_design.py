@@ -110,6 +110,8 @@ def pushed(lean: float = 0.0, parameter: int | None = None, deeper: float = 0.0)
     bundle = specified_bundle() if parameter is None else gel().more[parameter][0]
     moved = bundle.surface_operator("factor").displacement(force)
     now = view.rest_mm + estimator.nodes_to_markers @ moved
+    pressing = np.flatnonzero(near)
+    now[:, :2] += estimator.responses.beyond_mesh(pressing, force[near], np.arange(len(now)))
     now[:, 2] += deeper * (now[:, 2] - view.rest_mm[:, 2])
     now[:, 0] += lean * (now[:, 2] - view.rest_mm[:, 2])
     return np.asarray(view.camera.project(now))
