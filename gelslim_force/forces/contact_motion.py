@@ -24,7 +24,7 @@ _MOST_COVERED = 0.25
 
 @runtime_checkable
 class SeesDrift(Protocol):
-    """A source that reckons with what the correction of drift takes off the motion by a load."""
+    """A source whose model holds what the correction of drift takes off the motion by a load."""
 
     def look_corrected(self, image: NDArray[np.uint8], drift: FrameDrift) -> Any:
         """As `NormalSource.look`, of a frame with this drift."""

@@ -17,7 +17,7 @@ from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 Array = NDArray[np.float64]
 
 _LEAK_UNKNOWN = 0.6
-"""Part that a model of the gel does not tell of what a load moves the markers far away."""
+"""Share of the motion of far markers by a load that the model of the gel may have wrong."""
 _HIDDEN_SHEAR = 0.2
 """Usual tangential force of a contact over its normal force."""
 

@@ -117,7 +117,8 @@ def pressing_nodes(
 ) -> Mask:
     """(c,) nodes of a region that press, alone and with their neighbours.
 
-    Several contacts are judged apart, and those that press much less than the others by these.
+    Each contact is judged by its own mean pressure; one that presses much less than the others, by
+    a share of the mean of all.
 
     Args:
         region: (c,) nodes that may press.
