@@ -218,9 +218,9 @@ class Trial:
             gel = self.pads.gel(contact.gel)
             key = gel.thickness_mm, gel.poissons_ratio, contact.law
             if key not in opened:
-                built = designed.with_gel(replace(designed.material, poissons_ratio=key[1]))
-                mesh = designed.mesh.stretched(key[0] / thickness)
-                known = replace(built, mesh=mesh, tolerances={})
+                material = replace(designed.material, poissons_ratio=key[1])
+                built = designed.with_gel(material, key[0] / thickness)
+                known = replace(built, tolerances={})
                 law = "linear" if contact.law == "linear" else "auto"
                 opened[key] = open_sensor(
                     known,

@@ -1,9 +1,9 @@
 """Contacts of known force on pads that the force pipeline does not have, for outside renderers.
 
-The finger is `gelslim2`. Forces are given tractions on a pad of half the pitch and eight layers, or
-balls whose contact is solved by axisymmetric finite elements with shear by given tractions; both
-come from tests/force. Modulus, thickness and Poisson's ratio are drawn within the tolerances that
-the bundle states.
+The finger is `gelslim2`. Forces are given tractions on a pad of half the pitch and eight layers,
+without what such a mesh has wrong near a force, or balls whose contact is solved by axisymmetric
+finite elements with shear by given tractions; both come from tests/force. Modulus, thickness and
+Poisson's ratio are drawn within the tolerances that the bundle states.
 """
 
 from __future__ import annotations
@@ -18,14 +18,13 @@ from scipy.interpolate import CubicSpline
 
 from bench.bench_data import see_tests
 from ifem_export.bundle.bundle import Bundle
-from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.ladder import refined
-from ifem_export.operators.surface_operator import SurfaceOperator, surface_operator
+from ifem_export.operators.surface_operator import surface_operator
 
 see_tests("force")
 
 from pressed_disc import PressedDisc, pressed_disc  # noqa: E402
-from pressed_samples import FRICTION, surface_splines, tractions  # noqa: E402
+from pressed_samples import FRICTION, FinePad, surface_splines, tractions  # noqa: E402
 
 Array = NDArray[np.float64]
 Motion = Callable[[Array], Array]
@@ -70,7 +69,7 @@ class OutsidePads:
             gel = self.gel(seed)
             size = np.exp(rng.uniform(*np.log(_SIZES)))
             points = gel.points_mm
-            force = tractions(points, rng) * gel.cell_mm2 * size
+            force = tractions(points, rng) * gel.pad.cell_mm2 * size
             if -force[:, 2].sum() >= LEAST_N:
                 return OutsideContact(
                     f"press {seed}",
@@ -82,7 +81,10 @@ class OutsidePads:
         raise AssertionError("no contact of sufficient force in a hundred draws")
 
     def ball(self, seed: int) -> OutsideContact:
-        """A ball that pushes, sticking or not, and shears by friction."""
+        """A ball that pushes, sticking or not, and shears by friction.
+
+        The motion under the push is that of an endless layer, and what the edges of the pad add.
+        """
         gel = self.gel(seed)
         rng = np.random.default_rng([62, seed])
         radius = float(rng.choice(_RADII_MM))
@@ -92,19 +94,15 @@ class OutsidePads:
         contact, place = rng.uniform(max(1.2, least), largest), rng.uniform(-6, 6, 2)
         push = gel.young_mpa * float(np.interp(contact, disc.contact_mm, disc.force_n))
         contact, outward, height = disc.at_force(push / gel.young_mpa)
-        points = gel.points_mm
-        inside = 1 - ((points[:, :2] - place) ** 2).sum(axis=1) / contact**2
-        share = np.sqrt(np.maximum(inside, 0))
-        share /= share.sum()
+        share = gel.round_share(place, contact)
         turn, friction = rng.uniform(0, 2 * np.pi), rng.uniform(0, FRICTION)
         shear = friction * push * np.array([np.cos(turn), np.sin(turn)])
         sheared = gel.motion(np.outer(share, [*shear, 0.0]))
         round_motion = _round_motion(place, disc.r_mm, outward, height)
+        edges = gel.by_edges(np.outer(share, [0.0, 0.0, -push]))
 
         def motion(places_mm: Array) -> Array:
-            moved = round_motion(places_mm)
-            moved[:, :2] += sheared(places_mm)[:, :2]
-            return moved
+            return round_motion(places_mm) + edges(places_mm) + sheared(places_mm)
 
         force = np.array([*shear, -push])
         wrench = np.concatenate([force, np.cross([*place, 0.0], force)])
@@ -125,11 +123,16 @@ class OutsidePads:
             stretch = 1 + _strain(disc, contact)
             radius = CALIBRATION_BALL_MM / 2 / stretch**2
         push = gel.young_mpa * float(np.interp(contact, disc.contact_mm, disc.force_n))
-        _, outward, height = disc.at_force(push / gel.young_mpa)
+        contact, outward, height = disc.at_force(push / gel.young_mpa)
         quarter = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])[number % 4]
         place = quarter * rng.uniform(1.0, 8.0, 2)
         wrench = np.array([0, 0, -push, -push * place[1], push * place[0], 0])
-        motion = _round_motion(place, disc.r_mm, outward, height)
+        round_motion = _round_motion(place, disc.r_mm, outward, height)
+        edges = gel.by_edges(np.outer(gel.round_share(place, contact), [0.0, 0.0, -push]))
+
+        def motion(places_mm: Array) -> Array:
+            return round_motion(places_mm) + edges(places_mm)
+
         return OutsideContact(f"calibration {number}", motion, wrench, place, 0)
 
     def gel(self, seed: int) -> BuiltGel:
@@ -142,34 +145,49 @@ class OutsidePads:
 
 @dataclass(frozen=True, eq=False)
 class BuiltGel:
-    """A gel on a mesh of half the pitch; its modulus is `young` times the design's."""
+    """A gel on a mesh of half the pitch; its modulus is `young` times the design's.
 
-    mesh: PadMesh
-    operator: SurfaceOperator
-    designed_mpa: float
-    poissons_ratio: float
+    Attributes:
+        pad: Mesh, material and how it yields, for the modulus of the design.
+        thickness_mm: Its thickness.
+        young: Modulus over that of the design.
+    """
+
+    pad: FinePad
     thickness_mm: float
     young: float = 1.0
 
     @property
     def young_mpa(self) -> float:
         """Young's modulus."""
-        return self.young * self.designed_mpa
+        return self.young * self.pad.gel.youngs_modulus_mpa
+
+    @property
+    def poissons_ratio(self) -> float:
+        """Poisson's ratio."""
+        return self.pad.gel.poissons_ratio
 
     @property
     def points_mm(self) -> Array:
         """(n, 3) surface nodes."""
-        return np.asarray(self.mesh.surface_mm)
-
-    @property
-    def cell_mm2(self) -> float:
-        """Area of a cell of the surface."""
-        return float(np.prod(self.mesh.cell_size_mm[:2]))
+        return self.pad.points_mm
 
     def motion(self, force_n: Array) -> Motion:
         """Motion of the surface under forces (n, 3) on its nodes."""
-        moved = self.operator.displacement(force_n / self.young)
-        splines = surface_splines(self.points_mm, moved)
+        return self._through(self.pad.displacement(force_n / self.young))
+
+    def by_edges(self, force_n: Array) -> Motion:
+        """What the edges of the pad add to the motion of an endless one."""
+        return self._through(self.pad.by_edges(force_n / self.young))
+
+    def round_share(self, place_mm: Array, contact_mm: float) -> Array:
+        """(n,) share of Hertz's pressure that each node takes."""
+        away = ((self.points_mm[:, :2] - place_mm) ** 2).sum(axis=1)
+        share = np.sqrt(np.maximum(1 - away / contact_mm**2, 0.0))
+        return np.asarray(share / share.sum())
+
+    def _through(self, moved_mm: Array) -> Motion:
+        splines = surface_splines(self.points_mm, moved_mm)
         return lambda places: np.column_stack([s.ev(*places.T) for s in splines])
 
 
@@ -180,8 +198,8 @@ def _built_gel(bundle: Bundle, number: int) -> BuiltGel:
     thickness = designed + thicker * bundle.tolerances["thickness_mm"]
     ratio = bundle.material.poissons_ratio + softer * bundle.tolerances["poissons_ratio"]
     mesh = refined(bundle.mesh.stretched(thickness / designed))
-    operator = surface_operator(mesh, replace(bundle.material, poissons_ratio=ratio), "bbar", "pcg")
-    return BuiltGel(mesh, operator, bundle.material.youngs_modulus_mpa, ratio, thickness)
+    gel = replace(bundle.material, poissons_ratio=ratio)
+    return BuiltGel(FinePad(mesh, gel, surface_operator(mesh, gel, "bbar", "pcg")), thickness)
 
 
 def _strain(disc: PressedDisc, contact_mm: float) -> float:

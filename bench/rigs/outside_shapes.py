@@ -1,7 +1,8 @@
 """Rigid shapes pressed deeply into neo-Hookean gels that the force pipeline does not have.
 
 Shapes, depths, friction and drag are drawn as for the deep contacts of tests/force, whose Newton
-method solves them on half the pitch. The gel ends so far from the contact that its edge does not
+method solves them on half the pitch; what such a mesh has wrong of the motion near a force is taken
+off. The gel ends so far from the contact that its edge does not
 move, so that the motion may be put anywhere on a pad that is as far from its edge.
 """
 
@@ -33,6 +34,7 @@ from deep_contacts import (  # noqa: E402
     finer_pad,
     solve,
 )
+from near_forces import NearForces  # noqa: E402
 from pressed_samples import surface_splines  # noqa: E402
 from sensor_samples import sensor_bundle  # noqa: E402
 
@@ -95,9 +97,13 @@ class OutsideShapes:
         return self.pads.gel(number).young_mpa / sensor_bundle().material.youngs_modulus_mpa
 
     def _placed(self, number: int, contact: DeepContact) -> OutsideContact:
-        points = np.asarray(finer_pad(contact.case.thickness).surface_mm)
+        mesh = finer_pad(contact.case.thickness)
+        points = np.asarray(mesh.surface_mm)
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-        splines = surface_splines(points, contact.moved_mm)
+        ratio = contact.case.poissons_ratio
+        material = replace(sensor_bundle().material, poissons_ratio=ratio)
+        missing = NearForces(mesh, material).missing(contact.force_n)
+        splines = surface_splines(points, contact.moved_mm + missing)
         place = np.random.default_rng([66, number]).uniform(-_PLACES_MM, _PLACES_MM, 2)
 
         def motion(places_mm: Array) -> Array:

@@ -32,6 +32,8 @@ from ifem_export.operators.crowned_system import pad_system
 from ifem_export.operators.operator_ladder import OperatorLadder, chosen_rung
 from ifem_export.operators.surface_operator import Rung, SurfaceOperator, surface_operator
 
+ELEMENT_MATRIX = "element_matrix_n_per_mm"
+"""Name under which the element matrix is stored."""
 ELEMENT_TOLERANCE = 1e-12
 """Largest relative difference between the stored element matrix and that of the material."""
 _WITHOUT_ADJOINT = ("paper", "factor", "dense32")
@@ -63,6 +65,10 @@ class Bundle:
         skin: Coat and fabric on the gel; None where the gel counts as bare. The operators of the
             surface contain them.
         imported: What is known of a sensor that was not generated; None for a generated one.
+
+    Raises:
+        IfemError: `element_matrix` is not that of the mesh and the material; `with_gel` changes all
+            of them together.
     """
 
     mesh: PadMesh
@@ -82,6 +88,16 @@ class Bundle:
     stored_adjoint: NDArray[np.float64] | None = None
     skin: Skin | None = None
     imported: Imported | None = None
+
+    def __post_init__(self) -> None:
+        expected = hex8_stiffness(self.mesh.cell_size_mm, self.material, self.formulation)
+        gap = np.abs(self.element_matrix - expected).max() / np.abs(expected).max()
+        if not gap <= ELEMENT_TOLERANCE:
+            raise IfemError(
+                f"the element matrix differs by {gap:.2g} from the {self.formulation} element of "
+                "this mesh and material; change them by `with_gel`",
+                field=ELEMENT_MATRIX,
+            )
 
     def __str__(self) -> str:
         """The sensor in a line: pad, gel, markers and light."""
@@ -149,15 +165,11 @@ class Bundle:
     def adjoint(self) -> AdjointFields:
         """Adjoint fields of the pad: as stored, or else computed once.
 
-        Stored fields are not used where the material was changed after they were made. Raises
-        ConvergenceError where the inner nodes cannot be solved for.
+        Raises ConvergenceError where the inner nodes cannot be solved for.
         """
-        matrix = hex8_stiffness(self.mesh.cell_size_mm, self.material, self.formulation)
         if self.stored_adjoint is not None:
-            gap = np.abs(matrix - self.element_matrix).max()
-            if gap <= ELEMENT_TOLERANCE * np.abs(matrix).max():
-                return stored_fields(self.mesh, self.stored_adjoint)
-        return adjoint_fields(pad_system(self.mesh, matrix))
+            return stored_fields(self.mesh, self.stored_adjoint)
+        return adjoint_fields(pad_system(self.mesh, np.asarray(self.element_matrix)))
 
     def with_adjoint(self) -> Bundle:
         """The bundle with its adjoint fields stored. Raises as `adjoint`."""

@@ -1,4 +1,4 @@
-"""Checks that the parts of a bundle agree: values, indices, mesh, element and self-test pair."""
+"""Checks that the parts of a bundle agree: values, indices, mesh and self-test pair."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ifem_export.assembly.assembly import corner_fill
-from ifem_export.bundle.bundle import ELEMENT_TOLERANCE, Bundle
+from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.layout import bundle_arrays
 from ifem_export.bundle.manifest import REBUILD
 from ifem_export.bundle.self_test import elementwise_force
-from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.markers.field import MarkerField
 from ifem_export.markers.thin_plate import affine
@@ -34,7 +33,6 @@ def check_bundle(bundle: Bundle) -> None:
     """
     _check_finite(bundle)
     _check_mesh(bundle.mesh)
-    _check_element(bundle)
     if bundle.stiffness is not None:
         _check_csr("stiffness", bundle.stiffness)
     _check_markers(bundle.markers)
@@ -106,19 +104,6 @@ def _stored_surface(mesh: PadMesh) -> NDArray[np.int32]:
     if (k < 1).any() or ((k == top) & (shift > 0.0)).any() or (np.diff(nodes) <= 0).any():
         _fail("surface_nodes", "does not follow from the occupancy: off its columns")
     return nodes
-
-
-def _check_element(bundle: Bundle) -> None:
-    try:
-        expected = hex8_stiffness(bundle.mesh.cell_size_mm, bundle.material, bundle.formulation)
-    except IfemError as error:
-        raise BundleError("manifest.json", str(error), REBUILD) from error
-    gap = np.abs(bundle.element_matrix - expected).max() / np.abs(expected).max()
-    if gap > ELEMENT_TOLERANCE:
-        _fail(
-            "element_matrix_n_per_mm",
-            f"differs by {gap:.2g} from the {bundle.formulation} element of this material",
-        )
 
 
 def _check_markers(markers: MarkerField | None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ifem_export.bundle.bundle import Bundle
+from ifem_export.bundle.bundle import ELEMENT_MATRIX, Bundle
 from ifem_export.bundle.imported import Imported
 from ifem_export.bundle.manifest import ADJOINT_VERSION, MANIFEST, REBUILD
 from ifem_export.bundle.self_test import SelfTest
@@ -35,7 +35,7 @@ def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
         "free_nodes": mesh.free,
         "surface_nodes": mesh.surface,
         "side_nodes": mesh.sides,
-        "element_matrix_n_per_mm": bundle.element_matrix,
+        ELEMENT_MATRIX: bundle.element_matrix,
         "self_test_displacement_mm": bundle.self_test.displacement_mm,
         "self_test_force_n": bundle.self_test.force_n,
     }
@@ -69,7 +69,7 @@ def bundle_from(
     arrays: dict[str, NDArray[Any]],
     ladder: tuple[OperatorLadder | None, str] = (None, ""),
 ) -> Bundle:
-    """Make a bundle from its manifest and the opened arrays, without reading their values.
+    """Make a bundle from its manifest and the opened arrays; only the element's values are read.
 
     Raises:
         BundleError: A section or array is missing or does not fit the others.
@@ -81,30 +81,43 @@ def bundle_from(
         has_stiffness = bool(manifest["stiffness"]["stored"])
     mesh = _mesh_from(manifest, take)
     n = mesh.n_nodes
-    return Bundle(
-        mesh=mesh,
-        material=material,
-        formulation=formulation,
-        element_matrix=take("element_matrix_n_per_mm", "<f8", (24, 24)),
-        stiffness=take.csr("stiffness", "stiffness_data_n_per_mm", (3 * n, 3 * n))
-        if has_stiffness
-        else None,
-        markers=_markers_from(manifest, take, len(mesh.surface)),
-        camera=manifest["camera"],
-        self_test=SelfTest(
-            take("self_test_displacement_mm", "<f8", (n, 3)),
-            take("self_test_force_n", "<f8", (n, 3)),
-        ),
-        spec_hash=manifest["spec_hash"],
-        ladder=ladder[0],
-        operator=ladder[1],
-        outline=_outline_from(manifest),
-        tolerances=dict(manifest.get("tolerances") or {}),
-        light={name: take(f"light_{name}") for name in manifest.get("light") or ()},
-        stored_adjoint=_adjoint_from(manifest, take, len(mesh.surface)),
-        skin=_skin_from(manifest),
-        imported=_imported_from(manifest),
-    )
+    with _told_as_damaged():
+        return Bundle(
+            mesh=mesh,
+            material=material,
+            formulation=formulation,
+            element_matrix=take(ELEMENT_MATRIX, "<f8", (24, 24)),
+            stiffness=take.csr("stiffness", "stiffness_data_n_per_mm", (3 * n, 3 * n))
+            if has_stiffness
+            else None,
+            markers=_markers_from(manifest, take, len(mesh.surface)),
+            camera=manifest["camera"],
+            self_test=SelfTest(
+                take("self_test_displacement_mm", "<f8", (n, 3)),
+                take("self_test_force_n", "<f8", (n, 3)),
+            ),
+            spec_hash=manifest["spec_hash"],
+            ladder=ladder[0],
+            operator=ladder[1],
+            outline=_outline_from(manifest),
+            tolerances=dict(manifest.get("tolerances") or {}),
+            light={name: take(f"light_{name}") for name in manifest.get("light") or ()},
+            stored_adjoint=_adjoint_from(manifest, take, len(mesh.surface)),
+            skin=_skin_from(manifest),
+            imported=_imported_from(manifest),
+        )
+
+
+@contextmanager
+def _told_as_damaged() -> Iterator[None]:
+    """Raise BundleError where the element matrix is not that of mesh and material."""
+    try:
+        yield
+    except BundleError:
+        raise
+    except IfemError as error:
+        file = f"{ELEMENT_MATRIX}.npy" if error.field == ELEMENT_MATRIX else MANIFEST
+        raise BundleError(file, str(error), REBUILD) from error
 
 
 @contextmanager

@@ -87,9 +87,9 @@ def _specified_gel(light: LightCalibration | None) -> ForcePipeline:
 def _known_gel(made: MadeGel, light: LightCalibration | None) -> ForcePipeline:
     """With a gel that has no tolerances; its modulus, which only scales forces, is the design's."""
     designed = lit_bundle()
-    bundle = designed.with_gel(replace(designed.material, poissons_ratio=made.poissons_ratio))
-    mesh = designed.mesh.stretched(made.thickness)
-    return _pipeline(replace(bundle, mesh=mesh, tolerances={}), light)
+    material = replace(designed.material, poissons_ratio=made.poissons_ratio)
+    built = designed.with_gel(material, made.thickness)
+    return _pipeline(replace(built, tolerances={}), light)
 
 
 def _pipeline(

@@ -13,7 +13,7 @@ from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.bundle.check import check_adjoint
 from ifem_export.bundle.files import load_bundle, write_bundle
 from ifem_export.elements.material import Material
-from ifem_export.errors import BundleError
+from ifem_export.errors import BundleError, IfemError
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import build_pad_mesh
 
@@ -61,8 +61,18 @@ def test_a_bundle_without_them_or_with_others_computes_them(
 
 def test_fields_of_another_material_are_not_used(made, motion) -> None:
     stored = made.with_adjoint()
-    stiffer = replace(stored, material=replace(made.material, youngs_modulus_mpa=2 * E_MPA))
+    stiffer = stored.with_gel(replace(made.material, youngs_modulus_mpa=2 * E_MPA))
+    assert stiffer.stored_adjoint is None
     assert stiffer.adjoint.wrench(motion) == pytest.approx(2 * exact(made, motion), rel=1e-7)
+
+
+def test_a_bundle_whose_element_is_of_another_mesh_or_gel_cannot_be_made(made) -> None:
+    """A stretched mesh with the element of the old one gave shear forces 2 % off, silently."""
+    with pytest.raises(IfemError) as caught:
+        replace(made, mesh=made.mesh.stretched(1.025))
+    assert caught.value.field == "element_matrix_n_per_mm"
+    with pytest.raises(IfemError):
+        replace(made, material=replace(made.material, poissons_ratio=0.4))
 
 
 @pytest.mark.parametrize("damage", ["one force", "sign"])

@@ -168,7 +168,7 @@ def test_moved_markers_no_longer_match_the_geometry_hash(stored):
         (lambda m: m["element"].update(formulation="bbar"), "element_matrix_n_per_mm.npy"),
         (lambda m: m["element"].update(formulation="magic"), "manifest.json"),
         (lambda m: m["mesh"].update(cell_size_mm=[0.4, 0.4]), "manifest.json"),
-        (lambda m: m["mesh"]["cell_size_mm"].reverse(), "nodes_mm.npy"),
+        (lambda m: m["mesh"]["cell_size_mm"].reverse(), "element_matrix_n_per_mm.npy"),
         (lambda m: m["mesh"].pop("nodes"), "manifest.json"),
         (lambda m: m["arrays"].pop("hexes"), "hexes.npy"),
         (lambda m: m["arrays"]["hexes"].update(file="../../hexes.npy"), "manifest.json"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -132,7 +131,7 @@ def test_file_is_taken_up_and_renewed(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.displacement(np.arange(3), force), moved)
     again.store()
     assert path.read_bytes() == stamp
-    other = SurfaceCompliance(replace(pad, material=Material(0.2, 0.49, 1000.0)), tmp_path)
+    other = SurfaceCompliance(pad.with_gel(Material(0.2, 0.49, 1000.0)), tmp_path)
     assert not other._made.any()
 
 
