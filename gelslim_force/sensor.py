@@ -250,9 +250,12 @@ def indenter_source(
     )
     chosen = settings or PipelineSettings()
     model = chosen.contact(bundle, shape)
-    hidden_n = JointSettings().unseen_force * bundle.material.youngs_modulus_mpa
+    unseen = JointSettings()
+    hidden_n = unseen.unseen_force * bundle.material.youngs_modulus_mpa
     hidden_mm = hidden_n / layer_stiffness_n_mm(bundle)
-    return IndenterSource(finder, model, shape, depth_mm, hidden_n=hidden_n, hidden_mm=hidden_mm)
+    share = unseen.unseen_by_markers / unseen.unseen_force
+    given = finder, model, shape, depth_mm
+    return IndenterSource(*given, hidden_n=hidden_n, hidden_mm=hidden_mm, under_reflection=share)
 
 
 def unknown_source(

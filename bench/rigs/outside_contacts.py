@@ -8,13 +8,11 @@ Poisson's ratio are drawn within the tolerances that the bundle states.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from bench.bench_data import see_tests
 from ifem_export.bundle.bundle import Bundle
@@ -23,11 +21,11 @@ from ifem_export.operators.surface_operator import surface_operator
 
 see_tests("force")
 
+from ball_motion import Motion, ball_motion, round_share, through  # noqa: E402
 from pressed_disc import PressedDisc, pressed_disc  # noqa: E402
-from pressed_samples import FRICTION, FinePad, surface_splines, tractions  # noqa: E402
+from pressed_samples import FRICTION, FinePad, tractions  # noqa: E402
 
 Array = NDArray[np.float64]
-Motion = Callable[[Array], Array]
 GELS = ((-1, 1), (1, 1), (1, -1), (-1, -1))
 """Thickness and Poisson's ratio of the built gels, in standard deviations."""
 CALIBRATION_BALL_MM = 8.0
@@ -93,16 +91,14 @@ class OutsidePads:
         largest = min(2.8, float(np.sqrt(2 * radius * 0.3 * gel.thickness_mm)))
         contact, place = rng.uniform(max(1.2, least), largest), rng.uniform(-6, 6, 2)
         push = gel.young_mpa * float(np.interp(contact, disc.contact_mm, disc.force_n))
-        contact, outward, height = disc.at_force(push / gel.young_mpa)
-        share = gel.round_share(place, contact)
+        share = round_share(gel.points_mm, place, contact)
         turn, friction = rng.uniform(0, 2 * np.pi), rng.uniform(0, FRICTION)
         shear = friction * push * np.array([np.cos(turn), np.sin(turn)])
         sheared = gel.motion(np.outer(share, [*shear, 0.0]))
-        round_motion = _round_motion(place, disc.r_mm, outward, height)
-        edges = gel.by_edges(np.outer(share, [0.0, 0.0, -push]))
+        pressed = ball_motion(disc, gel.pad, place, push, gel.young)
 
         def motion(places_mm: Array) -> Array:
-            return round_motion(places_mm) + edges(places_mm) + sheared(places_mm)
+            return pressed(places_mm) + sheared(places_mm)
 
         force = np.array([*shear, -push])
         wrench = np.concatenate([force, np.cross([*place, 0.0], force)])
@@ -123,16 +119,10 @@ class OutsidePads:
             stretch = 1 + _strain(disc, contact)
             radius = CALIBRATION_BALL_MM / 2 / stretch**2
         push = gel.young_mpa * float(np.interp(contact, disc.contact_mm, disc.force_n))
-        contact, outward, height = disc.at_force(push / gel.young_mpa)
         quarter = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])[number % 4]
         place = quarter * rng.uniform(1.0, 8.0, 2)
         wrench = np.array([0, 0, -push, -push * place[1], push * place[0], 0])
-        round_motion = _round_motion(place, disc.r_mm, outward, height)
-        edges = gel.by_edges(np.outer(gel.round_share(place, contact), [0.0, 0.0, -push]))
-
-        def motion(places_mm: Array) -> Array:
-            return round_motion(places_mm) + edges(places_mm)
-
+        motion = ball_motion(disc, gel.pad, place, push, gel.young)
         return OutsideContact(f"calibration {number}", motion, wrench, place, 0)
 
     def gel(self, seed: int) -> BuiltGel:
@@ -174,21 +164,7 @@ class BuiltGel:
 
     def motion(self, force_n: Array) -> Motion:
         """Motion of the surface under forces (n, 3) on its nodes."""
-        return self._through(self.pad.displacement(force_n / self.young))
-
-    def by_edges(self, force_n: Array) -> Motion:
-        """What the edges of the pad add to the motion of an endless one."""
-        return self._through(self.pad.by_edges(force_n / self.young))
-
-    def round_share(self, place_mm: Array, contact_mm: float) -> Array:
-        """(n,) share of Hertz's pressure that each node takes."""
-        away = ((self.points_mm[:, :2] - place_mm) ** 2).sum(axis=1)
-        share = np.sqrt(np.maximum(1 - away / contact_mm**2, 0.0))
-        return np.asarray(share / share.sum())
-
-    def _through(self, moved_mm: Array) -> Motion:
-        splines = surface_splines(self.points_mm, moved_mm)
-        return lambda places: np.column_stack([s.ev(*places.T) for s in splines])
+        return through(self.pad, self.pad.displacement(force_n / self.young))
 
 
 @cache
@@ -208,17 +184,6 @@ def _strain(disc: PressedDisc, contact_mm: float) -> float:
     inside = (disc.r_mm > 0) & (disc.r_mm <= disc.contact_mm[state])
     r = disc.r_mm[inside]
     return float(np.average(disc.outward_mm[state][inside] / r, weights=r))
-
-
-def _round_motion(place: Array, r_mm: Array, outward_mm: Array, height_mm: Array) -> Motion:
-    out, down = CubicSpline(r_mm, outward_mm), CubicSpline(r_mm, height_mm)
-
-    def motion(places_mm: Array) -> Array:
-        away = places_mm - place
-        r = np.minimum(np.hypot(*away.T), r_mm[-2])
-        return np.column_stack([away * (out(r) / np.maximum(r, 1e-9))[:, None], down(r)])
-
-    return motion
 
 
 def contact_wrench(points_mm: Array, force_n: Array) -> Array:

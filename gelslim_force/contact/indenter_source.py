@@ -18,6 +18,15 @@ from gelslim_force.contact.shading_change import MOST_FAINT, TOO_FAINT, LostColo
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class UnderReflection:
+    """No patch is seen, and a reflection may hide one."""
+
+
+SeenPatch = ContactPatch | UnderReflection | str | None
+"""The patch of a frame, or why none is seen; None without contact."""
+
+
 @dataclass(frozen=True, eq=False)
 class IndenterSource:
     """Patch finder and contact model of one indenter.
@@ -35,6 +44,8 @@ class IndenterSource:
             `motion` then gives the derivatives by these parameters.
         hidden_n: Standard deviation of the normal force of a contact that is not seen.
         hidden_mm: That of the height of the whole surface that causes it.
+        under_reflection: By how much both are larger where a reflection may hide a contact, which
+            only the markers show then.
     """
 
     finder: PatchFinder
@@ -45,23 +56,26 @@ class IndenterSource:
     varied: tuple[tuple[NormalModel | BallModel, float], ...] = ()
     hidden_n: float = 0.0
     hidden_mm: float = 0.0
+    under_reflection: float = 1.0
 
     def prepare(self) -> None:
         """Compute the compliance of the whole pad now, so that no frame waits for it."""
         for model in (self.model, *(varied for varied, _ in self.varied)):
             model.prepare()
 
-    def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | str | None:
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenPatch:
         """The patch of a frame whose markers are at (n, 2), or why none can be seen."""
         try:
             light = self.finder.change(image, markers_px)
         except LostColourError as error:
             return str(error)
-        return TOO_FAINT if light.faint > MOST_FAINT else self.finder.patch_in(light)
+        if light.faint > MOST_FAINT:
+            return TOO_FAINT
+        patch = self.finder.patch_in(light)
+        covered = light.hidden is not None and light.hidden.any()
+        return UnderReflection() if patch is None and covered else patch
 
-    def motion(
-        self, seen: ContactPatch | str | None, lateral_mm: Array | None = None
-    ) -> NormalReading:
+    def motion(self, seen: SeenPatch, lateral_mm: Array | None = None) -> NormalReading:
         """Normal motion for a patch; zero without one, unknown with a reason in its place.
 
         `lateral_mm` (2,) is the mean lateral motion of the gel in the patch, where it is known.
@@ -69,8 +83,9 @@ class IndenterSource:
         count = len(self.model.points_mm)
         if isinstance(seen, str):
             return NormalReading.unknown(count, seen)
-        if seen is None:
-            return NormalReading.unseen(count, self.hidden_n, self.hidden_mm)
+        if not isinstance(seen, ContactPatch):
+            more = 1.0 if seen is None else self.under_reflection
+            return NormalReading.unseen(count, more * self.hidden_n, more * self.hidden_mm)
         at_rest = seen
         if lateral_mm is not None:
             at_rest = replace(seen, centre_mm=seen.centre_mm - lateral_mm)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gelslim_core.uncertainty import with_sigma
 from gelslim_force.contact.ball_model import BallModel
-from gelslim_force.contact.indenter_source import IndenterSource
+from gelslim_force.contact.indenter_source import IndenterSource, SeenPatch
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch
 from gelslim_force.joint.fit_state import JointForces
@@ -137,13 +137,13 @@ class CheckedIndenter:
         self._running: _Comparison | None = None
         self._waited = 0
 
-    def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenIndenter | str | None:
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenIndenter | SeenPatch:
         """The patch of a frame whose markers are at (n, 2), and what is compared with it.
 
-        Or, as of the named indenter, why none can be seen, and None without contact.
+        Without a patch it is what the named indenter has in its place.
         """
         patch = self.named.look(image, markers_px)
-        if patch is None or isinstance(patch, str):
+        if not isinstance(patch, ContactPatch):
             self.reset()
             return patch
         lost = bool(np.isnan(markers_px).any())

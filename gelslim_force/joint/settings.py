@@ -102,7 +102,7 @@ class JointSettings:
     deep_least_pressure: float = 0.25
     light_reach: int = 2
     marker_reach: int = 6
-    rounds: tuple[int, ...] = (2, 1)
+    rounds: tuple[int, ...] = (1, 1)
     following_rounds: tuple[int, ...] = (1, 1)
     deep_rounds: int = 3
     finer_pressure: bool = True

@@ -14,11 +14,11 @@ from functools import cache
 from itertools import count
 
 import numpy as np
+from ball_motion import ball_motion, round_share, through
 from camera_rig import off_centre_view
 from numpy.typing import NDArray
 from pressed_disc import pressed_disc
 from pressed_samples import FRICTION, fine_pad, lit_bundle, surface_splines, tractions
-from scipy.interpolate import CubicSpline
 from scipy.ndimage import affine_transform
 from scipy.stats import norm
 from sensor_samples import sensor_grid
@@ -166,11 +166,10 @@ def ball(seed: int) -> Contact:
 
 
 def ball_on(gel: MadeGel, gain: float, rng: np.random.Generator) -> Contact:
-    """A ball that pushes, sticking or not, and shears by friction.
+    """A ball that pushes, sticking or not, and shears by friction, whose tractions are Hertz's.
 
-    The motion under the push is that of an endless layer, and what the edges of the pad add to it
-    under Hertz's pressure. The tangential tractions are those of a layer; the antisymmetric heights
-    that they cause are left out, because the ball levels them by a pressure without a resultant.
+    The shear lifts the surface on one side and sinks it on the other, as if the ball were beside
+    the middle of the contact.
     """
     ball_mm = float(rng.choice(RADII_MM))
     nominal = lit_bundle()
@@ -180,24 +179,15 @@ def ball_on(gel: MadeGel, gain: float, rng: np.random.Generator) -> Contact:
     largest = min(2.8, float(np.sqrt(2 * ball_mm * _DEEPEST * thickness)))
     contact_mm, place = rng.uniform(1.2, largest), rng.uniform(-4.5, 4.5, 2)
     push = young * float(np.interp(contact_mm, disc.contact_mm, disc.force_n))
-    contact_mm, outward, height = disc.at_force(push / young)
     pad = fine_pad(gel.thickness, gel.poissons_ratio)
-    inside = 1 - ((pad.points_mm[:, :2] - place) ** 2).sum(axis=1) / contact_mm**2
-    pressure = np.sqrt(np.maximum(inside, 0))
+    pressed = ball_motion(disc, pad, place, push, gel.young)
     share, turn = rng.uniform(0, FRICTION), rng.uniform(0, 2 * np.pi)
     shear = share * push * np.array([np.cos(turn), np.sin(turn)])
-    force = np.column_stack([np.outer(pressure / pressure.sum(), shear), np.zeros(len(pressure))])
-    level = pad.displacement(force / gel.young) * [1, 1, 0]
-    pushes = np.column_stack([np.zeros((len(pressure), 2)), -pressure / pressure.sum() * push])
-    more = surface_splines(pad.points_mm, level + pad.by_edges(pushes / gel.young))
-    out, down = CubicSpline(disc.r_mm, outward), CubicSpline(disc.r_mm, height)
+    force = np.outer(round_share(pad.points_mm, place, contact_mm), [*shear, 0.0])
+    sheared = through(pad, pad.displacement(force / gel.young))
 
     def motion(places_mm: Array) -> Array:
-        away = places_mm - place
-        r = np.minimum(np.hypot(*away.T), disc.r_mm[-2])
-        lateral = away * (out(r) / np.maximum(r, 1e-9))[:, None]
-        found = np.column_stack([s.ev(*places_mm.T) for s in more])
-        return found + np.column_stack([lateral, down(r)])
+        return pressed(places_mm) + sheared(places_mm)
 
     nodes = np.asarray(nominal.mesh.surface_mm)[:, :2]
     force_n = np.array([*shear, -push])
