@@ -118,7 +118,7 @@ def pressing_nodes(
     """(c,) nodes of a region that press, alone and with their neighbours.
 
     Each contact is judged by its own mean pressure; one that presses much less than the others, by
-    a share of the mean of all.
+    a share of the mean of all. Contacts that only nodes with less than that join are two.
 
     Args:
         region: (c,) nodes that may press.
@@ -133,13 +133,13 @@ def pressing_nodes(
     """
     if not (pressure > 0).any():
         return region
-    about = around @ pressure
-    part = _parts(region, lattice)
+    about = (pressure + around @ pressure) / 2
+    whole = least * float(pressure @ pressure) / float(pressure.sum())
+    part = _parts(region & (about > _FAINT * whole), lattice)
     total = np.bincount(part, pressure)
     mean = np.bincount(part, pressure * pressure) / np.maximum(total, 1e-300)
-    whole = float(pressure @ pressure) / float(pressure.sum())
-    limit = least * np.maximum(mean, _FAINT * whole)
-    pressing = region & ((pressure + about) / 2 > limit[part])
+    limit = np.maximum(least * mean, _FAINT * whole)
+    pressing = region & (about > limit[part])
     return np.asarray(pressing if pressing.any() else region)
 
 

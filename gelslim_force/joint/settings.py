@@ -39,8 +39,8 @@ class JointSettings:
         deep_light_share: The same of a contact that is pressed in by a fifth of the thickness or
             more, whose rims are steeper. Between a tenth and a fifth it grows from `light_share`.
         height_share: Error of the heights of a dent that all markers in it have in common, over the
-            heights: what the mesh leaves between its nodes. At the markers of 63 deep contacts it
-            is 8 % in the root mean square. It grows from 0 to this at a tenth of the thickness.
+            heights: what the mesh leaves between its nodes. With it the deviations of 63 deep
+            contacts hold. It grows from 0 to this at a tenth of the thickness.
         edge_share: What the mesh does not resolve of contacts at the edge of the gel, as a share of
             the force there, in each direction.
         gain_sigma: Standard deviation of the gain of the light.

@@ -38,11 +38,10 @@ def test_stored_forces_of_a_known_gel_are_within_three_percent() -> None:
     """What is left of the error is that of the method: light, markers, mesh and camera."""
     some = Scores.of(STORED, GEL_KNOWN)
     assert some.unknown == 0
-    assert np.median(np.abs(some.normal_error)) < 0.04
-    assert abs(some.normal_error.mean()) < 0.03
-    assert np.median(some.shear_error_n) < 0.003
-    # F_y has 1.52: its deviation is too small by a third where the gel is known exactly.
-    assert (np.sqrt((some.z[:, :3] ** 2).mean(axis=0)) < [1.3, 1.6, 1.3]).all()
+    assert np.median(np.abs(some.normal_error)) < 0.03
+    assert abs(some.normal_error.mean()) < 0.02
+    assert np.median(some.shear_error_n) < 0.002
+    assert (np.sqrt((some.z[:, :3] ** 2).mean(axis=0)) < 1.3).all()
 
 
 def test_deep_shapes_are_read_by_the_law_at_large_strain() -> None:
