@@ -5,8 +5,8 @@ and eight layers, with the operator of the infinite layer. The picture shows the
 exactly these forces. What the mesh has wrong near a force is taken off both, and the renderer is
 that of `pressed_samples`.
 
-A ball has the motion of axisymmetric elements instead: by forces on nodes that its dent only
-touches there, a named ball is 8 to 13 % off.
+A ball has the motion of axisymmetric elements instead. Where only nodes touch it the dent is not
+round enough: the force of a named ball was 8 to 13 % off.
 """
 
 from __future__ import annotations

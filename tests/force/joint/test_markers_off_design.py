@@ -163,4 +163,4 @@ def test_forces_change_with_heights_that_are_off_together_as_their_covariance_sa
     # With a third of it the same nodes press.
     change = 3 * np.abs(total(of_positions(pushed(deeper=share / 3))) - total(still))
     assert sigma[0] > 2e-5
-    np.testing.assert_allclose(change[[0, 2, 3, 4, 5]], sigma[[0, 2, 3, 4, 5]], rtol=0.15)
+    np.testing.assert_allclose(change[[0, 2, 3, 4, 5]], sigma[[0, 2, 3, 4, 5]], rtol=0.2)
