@@ -53,13 +53,13 @@ def settle(
     tried, trial = np.empty_like(residual), theta.copy()
     bins, shape = (x, y, parallax, change), (strip, curvature, blur)
     cost = _residual(bins, shape, theta, basis, residual)
-    damping, far, fresh, settled = 1e-3, True, False, False
+    damping, far, fresh = 1e-3, True, False
     for _ in range(steps):
         if far:
             _differences(bins, shape, theta, scale, basis, residual, tried, jacobian)
             fresh = True
         normal, gradient = _normal(jacobian, residual)
-        improved = False
+        improved, shortened = False, False
         for _ in range(TRIES):
             move = _bounded_step(normal, gradient, damping, theta, scale, trial)
             new = _residual(bins, shape, trial, basis, tried)
@@ -69,6 +69,7 @@ def settle(
             if not fresh:
                 break
             damping *= 6
+            shortened = True
         if not improved:
             if fresh:
                 break
@@ -80,15 +81,15 @@ def settle(
             move[k] = trial[k] - theta[k]
             if k < 3:
                 largest = max(largest, abs(move[k]) / trial[2])
-        far = largest > near
+        # A step that had to be shortened may be small far from the solution.
+        far = shortened or largest > near
         _broyden(jacobian, residual, tried, move)
         fresh = False
         theta[:] = trial
         residual[:] = tried
         cost = new
         damping = max(damping / 5, 1e-6)
-        settled = gained < 1e-3 * cost and largest < SETTLED
-        if settled:
+        if gained < 1e-3 * cost and largest < SETTLED and not shortened:
             break
     return cost
 

@@ -4,6 +4,10 @@ Inside the patch the slope grows linearly to the rim. Outside, at ρ times the s
 is that of Hertz's half-space: (2/π)(ρ asin 1/ρ - √(1 - 1/ρ²)) for a disc and ρ - √(ρ² - 1) for a
 strip. A factor exp(-decay (ρ - 1)) accounts for the rigid base of the layer. A second term,
 (ρ - 1) exp(-(1 + decay)(ρ - 1)), takes up the remaining difference.
+
+The slope falls off infinitely steeply at the rim. What a bin shows is the mean over its blur, which
+is the difference of the integral of the slope at both ends: it has no crease, so that the fit of
+the rim is smooth where the rim crosses the middles of bins.
 """
 
 from __future__ import annotations
@@ -15,10 +19,10 @@ import numpy as np
 from numba import njit
 
 COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-GAUSS_AT = 0.7745966692414834
-GAUSS_OUTER, GAUSS_MIDDLE = 5 / 18, 8 / 18
-TABLE, STEP = 160, 0.015
+TABLE, STEP = 80, 0.03
 """Number and size of the table's steps, up to a ratio of 6.8."""
+LEAST_BLUR = 1e-3
+"""Smallest half-width of the blur, over the size of the patch."""
 RIM_SINKING = 0.1
 MIDDLE_SINKING = 0.6
 """Approximate depth of the surface at the rim and in the middle, in a²/R."""
@@ -40,37 +44,57 @@ def law(ratio: Any, decay: Any, strip: Any) -> Any:
 
 
 @njit(**COMPILED)
-def _tabulated(decay: Any, strip: Any) -> Any:
-    """Both terms and the decay of the depth outside the rim (n, 3), at equal steps of √(ratio - 1).
+def integrals(decay: Any, strip: Any) -> Any:
+    """Integrals from the middle of both terms, and their derivatives (n, 4), outside the rim.
 
-    They are smooth functions of that root."""
-    table = np.empty((TABLE + 2, 3))
-    for k in range(TABLE + 2):
-        beyond = (k * STEP) ** 2
-        table[k, 0], table[k, 1] = law(1.0 + beyond, decay, strip)
-        table[k, 2] = math.exp(-2 * beyond)
+    The steps of √(ratio - 1) are equal, and the derivatives are those for one step: the terms are
+    smooth functions of that root. The integrals are Simpson's.
+    """
+    table = np.empty((TABLE + 1, 4))
+    one, two = 0.5, 0.0
+    for k in range(TABLE + 1):
+        root = k * STEP
+        first, second = law(1.0 + root * root, decay, strip)
+        weight = 2 * root * STEP
+        table[k, 2], table[k, 3] = weight * first, weight * second
+        if k > 0:
+            root -= STEP / 2
+            first, second = law(1.0 + root * root, decay, strip)
+            weight = 2 * root * STEP
+            one += (table[k - 1, 2] + 4 * weight * first + table[k, 2]) / 6
+            two += (table[k - 1, 3] + 4 * weight * second + table[k, 3]) / 6
+        table[k, 0], table[k, 1] = one, two
     return table
 
 
 @njit(**COMPILED)
-def _looked_up(ratio: Any, table: Any, column: Any) -> Any:
-    """A column by linear interpolation, for `ratio` >= 1; constant beyond the table."""
-    at = min(math.sqrt(ratio - 1) * (1 / STEP), TABLE)
+def _integral(ratio: Any, table: Any) -> Any:
+    """Integrals of both terms from the middle, by cubic interpolation; constant beyond the table"""
+    if ratio < 1.0:
+        return 0.5 * ratio * ratio, 0.0
+    at = math.sqrt(ratio - 1) * (1 / STEP)
+    if at >= TABLE:
+        return table[TABLE, 0], table[TABLE, 1]
     k = int(at)
-    return table[k, column] + (at - k) * (table[k + 1, column] - table[k, column])
+    t = at - k
+    end = t * t * (3 - 2 * t)
+    leaving, arriving = t * (1 - t) * (1 - t), t * t * (t - 1)
+    one = table[k, 0] + end * (table[k + 1, 0] - table[k, 0])
+    two = table[k, 1] + end * (table[k + 1, 1] - table[k, 1])
+    one += leaving * table[k, 2] + arriving * table[k + 1, 2]
+    two += leaving * table[k, 3] + arriving * table[k + 1, 3]
+    return one, two
 
 
 @njit(**COMPILED)
-def _both(ratio: Any, table: Any) -> Any:
-    if ratio < 1.0:
-        return ratio, 0.0
-    at = min(math.sqrt(ratio - 1) * (1 / STEP), TABLE)
-    k = int(at)
-    part = at - k
-    return (
-        table[k, 0] + part * (table[k + 1, 0] - table[k, 0]),
-        table[k, 1] + part * (table[k + 1, 1] - table[k, 1]),
-    )
+def blurred(ratio: Any, blur: Any, table: Any) -> Any:
+    """Means of both terms within `blur` of a ratio; the slope has the other sign beyond the middle.
+
+    `table` is that of `integrals`.
+    """
+    first, second = _integral(ratio + blur, table)
+    one, two = _integral(abs(ratio - blur), table)
+    return (first - one) / (2 * blur), (second - two) / (2 * blur)
 
 
 @njit(**COMPILED)
@@ -81,14 +105,14 @@ def slope_basis(
 
     `theta` (4,) are x, y, radius, decay of a disc, or offset, angle, half-width, decay of a strip.
     Where the curvature 1/R of the indenter is known, bins are moved to where the line of sight
-    meets the deformed gel; it moves by `parallax` (n, 2) per mm of height. `blur` (mm) widens the
-    crease at the rim. The columns are: slope along x and y (for a strip: across it, and 0), the
-    second term of both, the slope squared, and 1. The error of the interpolation is 1e-5 of the
-    slope at the rim.
+    meets the deformed gel; it moves by `parallax` (n, 2) per mm of height. The slope is the mean
+    within `blur` (mm). The columns are: slope along x and y (for a strip: across it, and 0), the
+    second term of both, the slope squared, and 1.
     """
     size, decay = theta[2], theta[3]
     sine, cosine, over_size = math.sin(theta[1]), math.cos(theta[1]), 1 / size
-    table = _tabulated(decay, strip)
+    table = integrals(decay, strip)
+    wide = max(blur * over_size, LEAST_BLUR)
     for k in range(len(x)):
         px, py = x[k], y[k]
         for turn in range(2):
@@ -103,15 +127,10 @@ def slope_basis(
             if ratio < 1:
                 depth = MIDDLE_SINKING - 0.5 * ratio * ratio
             else:
-                depth = RIM_SINKING * _looked_up(ratio, table, 2)
+                depth = RIM_SINKING * math.exp(-2 * (ratio - 1))
             z = -size * size * curvature * depth
             px, py = px + parallax[k, 0] * z, py + parallax[k, 1] * z
-        slope, second = _both(r * over_size, table)
-        slope, second = slope * GAUSS_MIDDLE, second * GAUSS_MIDDLE
-        for side in (-GAUSS_AT, GAUSS_AT):
-            one, two = _both(abs(r + side * blur) * over_size, table)
-            slope += GAUSS_OUTER * one
-            second += GAUSS_OUTER * two
+        slope, second = blurred(r * over_size, wide, table)
         over_r = 1 / r if r > 1e-9 else 0.0
         ux, uy = dx * over_r, dy * over_r
         out[k, 0], out[k, 1] = slope * ux, slope * uy

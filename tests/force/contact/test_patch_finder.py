@@ -380,9 +380,10 @@ def test_the_compiled_fit_ends_where_least_squares_does():
                 dx, dy = x - theta[0], y - theta[1]
             r = np.hypot(dx, dy)
             terms = np.zeros((2, 900))
-            for side, weight in ((-np.sqrt(0.6), 5), (0, 8), (np.sqrt(0.6), 5)):
-                ratio = np.abs(r + side * 0.05) / theta[2]
-                terms += weight / 18 * np.array([law(q, theta[3], strip) for q in ratio]).T
+            for side, weight in zip(*np.polynomial.legendre.leggauss(12), strict=True):
+                ratio = (r + side * 0.05) / theta[2]
+                slopes = [np.sign(q) * np.array(law(abs(q), theta[3], strip)) for q in ratio]
+                terms += weight / 2 * np.array(slopes).T
             unit = np.array([dx, dy]) / r
             return np.column_stack(
                 [*(terms[0] * unit), *(terms[1] * unit), terms[0] ** 2, 1 + 0 * x]

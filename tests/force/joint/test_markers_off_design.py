@@ -148,8 +148,15 @@ def test_forces_change_with_the_lean_of_the_view_as_their_covariance_says() -> N
 
 
 @pytest.mark.slow
-def test_forces_change_with_heights_that_are_off_together_as_their_covariance_says() -> None:
-    """Twice as deep as the contact, a deep one, so that half of the share of the heights counts."""
+def test_forces_change_with_heights_that_are_off_together_as_their_covariance_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Twice as deep as the contact, a deep one, so that half of the share of the heights counts.
+
+    The forces are solved closely, as what their solution leaves counts in so small a change.
+    """
+    monkeypatch.setattr("gelslim_force.joint.estimator.TOLERANCE", 1e-6)
+    monkeypatch.setattr("gelslim_force.joint.normal_equations.STEPS", 8000)
     estimator = by_markers().estimator
     positions = pushed()
     still = of_positions(positions)
@@ -163,4 +170,4 @@ def test_forces_change_with_heights_that_are_off_together_as_their_covariance_sa
     # With a third of it the same nodes press.
     change = 3 * np.abs(total(of_positions(pushed(deeper=share / 3))) - total(still))
     assert sigma[0] > 2e-5
-    np.testing.assert_allclose(change[[0, 2, 3, 4, 5]], sigma[[0, 2, 3, 4, 5]], rtol=0.2)
+    np.testing.assert_allclose(change[[0, 2, 3, 4, 5]], sigma[[0, 2, 3, 4, 5]], rtol=0.1)

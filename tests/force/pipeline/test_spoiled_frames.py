@@ -192,9 +192,8 @@ def test_no_exposure_changes_the_force_of_a_named_ball(
         assert result.wrench is not None
         assert (scores(result, truth.wrench[:3]) < 3).all()
         forces.append(result.wrench.force_n[2])
-    assert forces == pytest.approx([truth.wrench[2]] * len(forces), rel=0.09)
-    # The radius of a patch is known within 0.8 %, and the force within four times that.
-    assert forces == pytest.approx([forces[0]] * len(forces), rel=0.065)
+    assert forces == pytest.approx([truth.wrench[2]] * len(forces), rel=0.05)
+    assert forces == pytest.approx([forces[0]] * len(forces), rel=0.025)
 
 
 def gap(count: int) -> tuple[UnseenMotion, NDArray[np.bool_]]:
