@@ -50,6 +50,10 @@ _SHADING_ERROR = {"disc": 0.006, "strip": 0.01}
 """Relative error of a size from the shading: the law of the slope outside it is not exact. It finds
 the slopes of balls on a layer, for radii of contact of half the thickness to more than all of it,
 with errors of -0.3 to 0.6 %."""
+_LEAST_SIZE = 0.7
+"""Size of a fit to the shading over that of the patch it starts from, below which it is none. Under
+a contact at the edge of a picture the light does not follow the law of the slope, and a fit found a
+patch of two thirds of the outline."""
 _HIDDEN_RIM_ERROR = 0.05
 """Relative error of the size of a patch whose rim is hidden completely."""
 
@@ -245,7 +249,7 @@ class PatchFinder:
             return None
         law = self._law(window.bin_mm)
         fit = fit_shading(window, choose(window, starts, law), law)
-        if fit is None or not 0.4 < fit.values[2] / patch.size_mm < 2.0:
+        if fit is None or not _LEAST_SIZE < fit.values[2] / patch.size_mm < 2.0:
             return None
         return self._from_fit(fit, patch, law.curvature_per_mm, window.bin_mm), fit
 
