@@ -6,6 +6,8 @@ light, and pressures differ more from node to node.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,29 +37,39 @@ def least_pressure_at(settings: JointSettings, deep: float) -> float:
     return (1 - deep) * settings.least_pressure + deep * settings.deep_least_pressure
 
 
-def traction_sigma_mpa(
-    settings: JointSettings, deep: float, youngs_modulus_mpa: float, traction_mpa: Array
-) -> tuple[float, float]:
+@dataclass(frozen=True)
+class TractionSigma:
     """Standard deviations of what tractions are assumed to be.
+
+    Attributes:
+        rough_mpa: Of the difference of the tractions of neighbouring nodes.
+        tangential_mpa: Of what tangential tractions deviate from the part in common.
+        ratio: Of that part over the pressure, along each direction; 0 for none in common.
+    """
+
+    rough_mpa: float
+    tangential_mpa: float
+    ratio: float
+
+
+def traction_sigma(
+    settings: JointSettings, deep: float, youngs_modulus_mpa: float, traction_mpa: Array
+) -> TractionSigma:
+    """What is assumed of the tractions of a contact.
 
     Args:
         settings: Has the shares of the modulus and of the mean pressure.
         deep: As `deepness` gives it.
         youngs_modulus_mpa: Of the gel.
         traction_mpa: (p, 3) present ones of the nodes; means are weighted by the pressure.
-
-    Returns:
-        That of the difference of the tractions of neighbouring nodes, and that of tangential
-        tractions.
     """
     pressing = np.maximum(-traction_mpa[:, 2], 0.0)
     whole = max(float(pressing.sum()), 1e-12)
     mean = float(pressing @ pressing) / whole
     sheared = mean * float(np.linalg.norm(traction_mpa[:, :2].sum(axis=0))) / whole
-    return (
+    share = (1 - deep) * settings.shear_share + deep * settings.deep_shear_share
+    return TractionSigma(
         max(settings.roughness * youngs_modulus_mpa, settings.deep_roughness * deep * mean),
-        max(
-            settings.tangential_stress * youngs_modulus_mpa,
-            settings.shear_share * sheared,
-        ),
+        max(settings.tangential_stress * youngs_modulus_mpa, share * sheared),
+        (1 - deep) * settings.shear_ratio,
     )

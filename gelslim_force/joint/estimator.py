@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from gelslim_force.joint.common_shear import TangentialPrior
 from gelslim_force.joint.deepness import (
     deepness,
     least_pressure_at,
     light_share_at,
-    traction_sigma_mpa,
+    traction_sigma,
 )
 from gelslim_force.joint.finer_pressure import FinerPressure
 from gelslim_force.joint.finer_surface import FinerSurface
@@ -203,15 +204,16 @@ class JointEstimator:
         chosen, nodes, young = self.settings, data.nodes, self.youngs_modulus_mpa
         area = self.area_mm2[nodes]
         traction = data.start.reshape(-1, 3) / area[:, None]
-        rough, tangential = traction_sigma_mpa(chosen, data.deepness, young, traction)
+        sigma = traction_sigma(chosen, data.deepness, young, traction)
+        beside = self.lattice.adjacent(nodes)
         equations = data.equations.with_prior(
-            data.start,
-            self.lattice.adjacent(nodes),
-            area,
-            rough,
-            chosen.normal_stress * young,
-            tangential,
-        )
+            data.start, beside, area, sigma.rough_mpa, chosen.normal_stress * young,
+            sigma.tangential_mpa,
+        )  # fmt: skip
+        along = 3 * np.arange(len(nodes)) + np.array([[0], [1]])
+        prior = TangentialPrior(along, beside, area, sigma.rough_mpa, sigma.tangential_mpa)
+        push, at = -data.start[2::3], (nodes, self.lattice)
+        equations = prior.with_common_shear(equations, data.start, push, sigma.ratio, at)
         tolerance = TOLERANCE if self.pressure is None else _ROUGH_TOLERANCE
         found = equations.solved(data.start, chosen.friction, tolerance)
         force = np.zeros_like(self.points_mm)

@@ -27,19 +27,17 @@ class PressureParts:
     """Unknown forces of a contact: q normal ones at half the pitch, and tangential ones on nodes.
 
     Attributes:
-        nodes: (p,) with tangential forces.
+        nodes: (p,) that bear some of the forces, all with tangential ones.
         places: (f,) with normal forces.
         source: (f, 4) numbers of the unknown normal forces whose mean that on a place is. Between
             nodes inside a contact it follows from these; elsewhere all four are the same.
         own: (q,) the place of each unknown normal force, as an entry of `places`.
-        bearing: (r,) nodes that bear some of the forces.
     """
 
     nodes: Nodes
     places: Nodes
     source: Nodes
     own: Nodes
-    bearing: Nodes
 
     @property
     def size(self) -> int:
@@ -148,7 +146,7 @@ class FinerPressure:
         mark_columns(*entries, near, row)
         seen = np.flatnonzero(row >= 0)
         row[seen] = np.arange(len(seen))
-        rough = self.in_parts(responses.of_heights(parts.bearing, seen), parts)
+        rough = self.in_parts(responses.of_heights(parts.nodes, seen), parts)
         found = np.empty((len(near), parts.size), dtype=rough.dtype)
         interpolated_rows(*entries, interpolation.data, near, row, rough, found)
         seen_at, at = lattice.place[near], lattice.place[parts.places]
@@ -166,17 +164,16 @@ class FinerPressure:
         return found
 
     def in_parts(self, rows: Any, parts: PressureParts) -> Any:
-        """Columns (n, q + 2p) of the unknown forces by those (n, 3r) of forces on `bearing`."""
+        """Columns (n, q + 2p) of the unknown forces by those (n, 3p) of forces on `nodes`."""
         from gelslim_force.joint.kernels.finer_kernel import columns_in_parts
 
-        corners = np.searchsorted(parts.bearing, self.corners[parts.places])
-        nodes = np.searchsorted(parts.bearing, parts.nodes)
+        corners = np.searchsorted(parts.nodes, self.corners[parts.places])
         found = np.empty((len(rows), parts.size), dtype=rows.dtype)
-        columns_in_parts(rows, corners, parts.source, nodes, found)
+        columns_in_parts(rows, corners, parts.source, found)
         return found
 
     def parts(self, nodes: Nodes, inner: Mask) -> PressureParts:
-        """Unknown forces about nodes (p,), of which those marked in (c,) are inside the contact."""
+        """Unknown forces about nodes (n,), of which those marked in (c,) are inside the contact."""
         places, number = self.about(nodes), np.zeros(len(inner), dtype=np.intp)
         corners, between = self.corners[places], self._between[places]
         follows = between & inner[corners].all(axis=1)
@@ -184,7 +181,7 @@ class FinerPressure:
         number[corners[~between, 0]] = sought[~between]
         source = np.where(follows[:, None], number[corners], sought[:, None])
         bearing = np.unique(np.concatenate([corners.ravel(), nodes]))
-        return PressureParts(nodes, places, source, np.flatnonzero(~follows), bearing)
+        return PressureParts(bearing, places, source, np.flatnonzero(~follows))
 
     @cached_property
     def _between(self) -> Mask:

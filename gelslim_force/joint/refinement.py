@@ -3,10 +3,13 @@
 Forces on the nodes cannot express a pressure that ends between two of them, and are too small as a
 whole. Normal forces on the nodes and half way between them can, up to half a step beyond the nodes
 that press. Inside the contact the pressure half way between nodes is the mean of that on the nodes
-around it; only about the rim is it unknown. These forces are found with the tangential forces on
-the nodes by one more linearisation, and go to the nodes with the same resultant and moments.
+around it; only about the rim is it unknown. These forces are found with tangential forces by one
+more linearisation, and go to the nodes with the same resultant and moments. Tangential forces are
+on all nodes that bear some of the normal ones: without those beyond the rim, a shear is explained
+by a deeper contact, or a less deep one, by up to a tenth.
 
-The prior is that of the nodes for the same traction. The sum over neighbours of squared
+The prior is that of the nodes for the same traction, where a node has the area of its part of the
+places. The sum over neighbours of squared
 differences of a traction in the plane, ∫ |∇t|² dA, does not depend on the pitch; that of squared
 tractions grows with the number of places, 4, so that the size of each may be twice as large.
 """
@@ -19,7 +22,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.joint.deepness import traction_sigma_mpa
+from gelslim_force.joint.common_shear import TangentialPrior
+from gelslim_force.joint.deepness import traction_sigma
 from gelslim_force.joint.finer_pressure import FinerPressure, PressureParts
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, SoughtForces
 from gelslim_force.joint.light.rows import LightRows
@@ -55,43 +59,46 @@ def refined(estimator: JointEstimator, frame: FrameData, nodes: Nodes, state: Fi
     # The rim of a deep contact is steep.
     ring = 1 if estimator.deepness(state) > 0 else 0
     inner = ~estimator.lattice.widened(outside, ring)
-    return _Refinement(estimator, pressure, pressure.parts(nodes, inner)).of(frame, state)
+    parts = pressure.parts(nodes, inner)
+    return _Refinement(estimator, pressure, nodes, parts).of(frame, state)
 
 
 @dataclass(frozen=True, eq=False)
 class _Refinement:
-    """A linearisation with the forces of `parts` unknown."""
+    """A linearisation with the forces of `parts` unknown, about nodes (n,) that press."""
 
     estimator: JointEstimator
     pressure: FinerPressure
+    pressing: Nodes
     parts: PressureParts
 
     def of(self, frame: FrameData, state: FitState) -> FitState:
         """The estimate."""
         estimator, pressure, parts = self.estimator, self.pressure, self.parts
-        responses, nodes, bearing = estimator.responses, parts.nodes, parts.bearing
+        responses, nodes = estimator.responses, parts.nodes
         before = self._before(state)
         start, excess = self._on_nodes(before), estimator.excess(state)
-        moved = responses.displacement(bearing, start[bearing]) + excess.moved_mm
+        moved = responses.displacement(nodes, start[nodes]) + excess.moved_mm
         normal = parts.places, parts.normal(before)
         height = pressure.heights(moved[:, 2], (nodes, start[nodes, :2]), normal)
-        light = estimator.light_sums(frame, _mask(start, nodes), moved, state, height)
+        light = estimator.light_sums(frame, _mask(start, self.pressing), moved, state, height)
         assert light is not None
         heights = pressure.by_force(responses, light.nodes, parts)
-        markers = estimator.marker_rows(frame, bearing, moved, start[bearing])
+        markers = estimator.marker_rows(frame, nodes, moved, start[nodes])
         markers = replace(markers, rows=pressure.in_parts(markers.rows, parts))
         gain = 1 - state.gain, estimator.settings.gain_sigma
         equations = NormalEquations.of(parts.size)
         equations = equations.with_rows(markers.rows, markers.residual, markers.weight)
         equations = self._with_prior(equations.with_light(light, heights, gain), state, before)
         friction = estimator.settings.friction
-        found = _solved(equations, before, friction * np.maximum(-state.force_n[nodes, 2], 0.0))
+        push = -np.minimum(np.minimum(start[nodes, 2], state.force_n[nodes, 2]), 0.0)
+        found = _solved(equations, before, friction * push)
         force = self._on_nodes(found)
         force[nodes, :2] *= _share_in_cone(force[nodes], friction)[:, None]
         higher = (heights @ (found - before).astype(heights.dtype)).astype(float)
         return FitState(
             force,
-            GelMotion(responses, bearing, force[bearing], excess),
+            GelMotion(responses, nodes, force[nodes], excess),
             light.gain_after(higher, gain[1]),
             equations,
             self._sought(found, force),
@@ -102,10 +109,10 @@ class _Refinement:
 
     def _before(self, state: FitState) -> Array:
         """(q + 2p,) unknown forces that are nearest to an estimate on the nodes that may press."""
-        parts, held = self.parts, np.zeros(len(state.force_n))
-        held[parts.nodes] = state.force_n[parts.nodes, 2]
-        normal = self.pressure.forces(parts.places, held)[parts.own]
-        return np.concatenate([normal, state.force_n[parts.nodes, :2].ravel()])
+        parts, held = self.parts, np.zeros_like(state.force_n)
+        held[self.pressing] = state.force_n[self.pressing]
+        normal = self.pressure.forces(parts.places, held[:, 2])[parts.own]
+        return np.concatenate([normal, held[parts.nodes, :2].ravel()])
 
     def _on_nodes(self, unknown: Array) -> Array:
         """Forces (c, 3) on all nodes by the unknown ones (q + 2p,)."""
@@ -117,7 +124,7 @@ class _Refinement:
     def _sought(self, unknown: Array, force: Array) -> SoughtForces:
         """What was sought, with forces found (q + 2p,) that are (c, 3) on all nodes."""
         parts, rigid = self.parts, self.estimator.rigid
-        sums = self.pressure.in_parts(rigid[:, parts.bearing].reshape(len(rigid), -1), parts)
+        sums = self.pressure.in_parts(rigid[:, parts.nodes].reshape(len(rigid), -1), parts)
         pushes = np.repeat(force[parts.nodes, 2] < 0, 2)
         return SoughtForces(sums, np.concatenate([unknown[: len(parts.own)] < 0, pushes]))
 
@@ -129,21 +136,27 @@ class _Refinement:
 
         estimator, parts, nodes = self.estimator, self.parts, self.parts.nodes
         chosen, young, area = estimator.settings, estimator.youngs_modulus_mpa, estimator.area_mm2
-        mean = state.force_n[nodes] / area[nodes, None]
-        rough, tangential = traction_sigma_mpa(chosen, estimator.deepness(state), young, mean)
+        mean = state.force_n[self.pressing] / area[self.pressing, None]
+        sigma = traction_sigma(chosen, estimator.deepness(state), young, mean)
         hessian, slope = equations.hessian.copy(), equations.slope.copy()
         # Inside, a place has a quarter of the area of a node.
         share = self.pressure.between(parts.places, area) / 4
         at, size = self.pressure.surface.lattice.place[parts.places], _SIZES * chosen.normal_stress
-        given = rough, size * young, parts.source, parts.normal(before), hessian, slope
+        given = sigma.rough_mpa, size * young, parts.source, parts.normal(before), hessian, slope
         add_smoothness(at, share, *given)
-        at = estimator.lattice.place[nodes]
-        for axis in (0, 1):
-            own = parts.tangential[axis::2]
+        at, borne = estimator.lattice.place[nodes], self.pressure.on_nodes(parts.places, share)
+        numbers = parts.tangential.reshape(-1, 2).T
+        for own in numbers:
             alone = np.repeat(own[:, None], 4, axis=1)
-            given = rough, tangential, alone, before[own], hessian, slope
-            add_smoothness(at, area[nodes], *given)
-        return NormalEquations(hessian, slope)
+            given = sigma.rough_mpa, sigma.tangential_mpa, alone, before[own], hessian, slope
+            add_smoothness(at, borne[nodes], *given)
+        beside = estimator.lattice.adjacent(nodes)
+        prior = TangentialPrior(
+            numbers, beside, borne[nodes], sigma.rough_mpa, sigma.tangential_mpa
+        )
+        push, found = -self._on_nodes(before)[nodes, 2], NormalEquations(hessian, slope)
+        contact = nodes, estimator.lattice
+        return prior.with_common_shear(found, before, push, sigma.ratio, contact)
 
 
 def _mask(force: Array, nodes: Nodes) -> NDArray[np.bool_]:

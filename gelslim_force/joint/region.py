@@ -83,7 +83,7 @@ def rise_of(by_slope: Array, log_change: Array) -> Array | None:
 
 def _continued(region: Mask, hidden: Mask, lattice: NodeLattice) -> Mask:
     """(c,) the region with what is hidden next to it, where the contact may go on."""
-    part = _parts(hidden, lattice)
+    part = parts_of(hidden, lattice)
     beside = np.unique(part[lattice.widened(region, 1)])
     return np.asarray(region | (np.isin(part, beside) & hidden))
 
@@ -102,11 +102,11 @@ def is_new_contact(region: Mask, before: Mask, lattice: NodeLattice) -> bool:
     fresh = int((region & ~reached).sum())
     if not 0 < fresh <= _GROWS_FAST * int(region.sum()):
         return fresh > 0
-    part = _parts(region, lattice)
+    part = parts_of(region, lattice)
     return not np.isin(part[region], part[reached]).all()
 
 
-def _parts(nodes: Mask, lattice: NodeLattice) -> NDArray[np.int32]:
+def parts_of(nodes: Mask, lattice: NodeLattice) -> NDArray[np.int32]:
     """(c,) number of the connected part that each of the nodes belongs to, 0 for the others."""
     parts, _ = ndimage.label(lattice.picture(nodes), np.ones((3, 3)))
     return np.asarray(parts[lattice.place[:, 0], lattice.place[:, 1]])
@@ -135,7 +135,7 @@ def pressing_nodes(
         return region
     about = (pressure + around @ pressure) / 2
     whole = least * float(pressure @ pressure) / float(pressure.sum())
-    part = _parts(region & (about > _FAINT * whole), lattice)
+    part = parts_of(region & (about > _FAINT * whole), lattice)
     total = np.bincount(part, pressure)
     mean = np.bincount(part, pressure * pressure) / np.maximum(total, 1e-300)
     limit = np.maximum(least * mean, _FAINT * whole)

@@ -49,10 +49,14 @@ class JointSettings:
         deep_roughness: The same of a deep contact, over its mean pressure: one that presses harder
             has a steeper rim. It grows from 0 as `deep_light_share`; the larger of the two counts.
         normal_stress: Size of the pressure.
-        tangential_stress: Size of the tangential traction.
+        tangential_stress: Deviation of the tangential traction from that which the contact has in
+            common, in proportion to the pressure.
         shear_share: The same over the present mean traction of the contact along the surface; the
-            larger of the two counts. With a narrow limit a strongly sheared contact is explained by
-            a deeper one with less shear.
+            larger of the two counts.
+        deep_shear_share: The same of a deep contact, whose tractions have nothing in common: what
+            its steep rim does to light and markers is taken for tractions that deviate.
+        shear_ratio: Standard deviation of the common tangential traction over the pressure, along
+            each direction; see `common_shear`. 0 for none in common.
         unseen_force: Normal force of a contact that the light may not show, over Young's modulus,
             in mm². On drawn pictures contacts of half this force are not seen, and those of twice
             it are.
@@ -81,20 +85,22 @@ class JointSettings:
 
     friction: float = 1.2
     marker_mm: float = 0.0015
-    marker_share: float = 0.02
+    marker_share: float = 0.01
     bending_share: float = 0.8
-    light_error: float = 0.015
+    light_error: float = 0.01
     light_share: float = 0.05
     deep_light_share: float = 0.2
-    height_share: float = 0.06
+    height_share: float = 0.05
     edge_share: float = 0.05
     gain_sigma: float = 0.2
     gamma: float = USUAL_GAMMA
     roughness: float = 0.17
     deep_roughness: float = 2.0
     normal_stress: float = 1.4
-    tangential_stress: float = 0.07
-    shear_share: float = 1.5
+    tangential_stress: float = 0.03
+    shear_share: float = 0.5
+    deep_shear_share: float = 1.5
+    shear_ratio: float = 1.0
     unseen_force: float = 0.2
     unseen_by_markers: float = 0.5
     most_sigma: float = 0.4
@@ -139,6 +145,7 @@ class JointSettings:
             normal_stress=finer * self.normal_stress,
             tangential_stress=finer * self.tangential_stress,
             shear_share=finer * self.shear_share,
+            deep_shear_share=finer * self.deep_shear_share,
             light_reach=max(1, round(finer * self.light_reach)),
             marker_reach=max(1, round(finer * self.marker_reach)),
         )
@@ -153,6 +160,8 @@ class JointSettings:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: must be > 0")
         if not 0 <= self.least_pressure < 1:
             raise ValueError(f"least_pressure = {self.least_pressure!r}: must be in 0 ... 1")
+        if not self.shear_ratio >= 0:
+            raise ValueError(f"shear_ratio = {self.shear_ratio!r}: must be >= 0")
         if min(*self.rounds, *self.following_rounds) < 1:
             raise ValueError("rounds and following_rounds must be at least 1")
 
@@ -164,7 +173,10 @@ ON_NODES = JointSettings(
 and more of it is used."""
 MARKERS_ALONE = JointSettings(
     marker_mm=0.004,
+    tangential_stress=0.07,
     shear_share=0.0,
+    deep_shear_share=0.0,
+    shear_ratio=0.0,
     roughness=0.22,
     least_pressure=0.2,
     marker_reach=8,

@@ -113,17 +113,17 @@ def stencil_columns(stencil: Any, at: Any, places: Any, columns: Any, found: Any
 
 
 @njit(**COMPILED)
-def columns_in_parts(rows: Any, corners: Any, source: Any, tangential: Any, found: Any) -> None:
-    """Columns of normal forces that split evenly on four nodes, and of tangential ones on nodes.
+def columns_in_parts(rows: Any, corners: Any, source: Any, found: Any) -> None:
+    """Columns of normal forces that split evenly on four nodes, and of tangential ones on all.
 
     Args:
-        rows: (n, 3r) by the forces on r nodes.
+        rows: (n, 3p) by the forces on p nodes.
         corners: (f, 4) nodes of each normal force.
         source: (f, 4) of the q unknown normal forces, whose mean each force is.
-        tangential: (p,) nodes with tangential forces.
         found: Receives (n, q + 2p).
     """
-    sixteenth, half = rows.dtype.type(1 / 16), found.shape[1] - 2 * len(tangential)
+    nodes = rows.shape[1] // 3
+    sixteenth, half = rows.dtype.type(1 / 16), found.shape[1] - 2 * nodes
     for i in range(len(rows)):
         row, out = rows[i], found[i]
         out[:half] = 0
@@ -135,9 +135,9 @@ def columns_in_parts(rows: Any, corners: Any, source: Any, tangential: Any, foun
                 continue
             for corner in range(4):
                 out[source[k, corner]] += sixteenth * value
-        for n in range(len(tangential)):
-            out[half + 2 * n] = row[3 * tangential[n]]
-            out[half + 2 * n + 1] = row[3 * tangential[n] + 1]
+        for n in range(nodes):
+            out[half + 2 * n] = row[3 * n]
+            out[half + 2 * n + 1] = row[3 * n + 1]
 
 
 @njit(**COMPILED)

@@ -144,6 +144,51 @@ def add_prior(
 
 
 @njit(**COMPILED)
+def free_common_shear(
+    numbers: Any, neighbours: Any, area: Any, push: Any, part: Any, sizes: Any, start: Any,
+    hessian: Any, slope: Any,
+) -> None:  # fmt: skip
+    """Free what the tangential tractions of a contact have in common; see `common_shear`.
+
+    Args:
+        numbers: (2, p) of the unknown forces along x and y.
+        neighbours: (p, p) with 1 where nodes are neighbours.
+        area: (p,) of the nodes.
+        push: (p,) normal forces, 0 where there is none.
+        part: (p,) number of the contact of each node, 0 for none.
+        sizes: Standard deviations of the difference of neighbours, of a deviation, and of the
+            common ratio.
+        start: (k,) all unknown forces at the start.
+        hessian: (k, k), from which its part is taken.
+        slope: (k,), likewise.
+    """
+    rough, size, ratio = sizes
+    nodes = len(area)
+    pull = np.empty(nodes)
+    for number in range(1, part.max() + 1):
+        weight = 1 / (ratio * ratio)
+        for i in range(nodes):
+            own = push[i] / area[i] if part[i] == number else 0.0
+            pull[i] = own / (size * size * area[i])
+            for j in range(nodes):
+                if neighbours[i, j] != 0:
+                    other = push[j] / area[j] if part[j] == number else 0.0
+                    pull[i] += neighbours[i, j] * (own - other) / (rough * rough * area[i])
+            if part[i] == number:
+                weight += push[i] * pull[i]
+        for axis in range(2):
+            at, common = numbers[axis], 0.0
+            for i in range(nodes):
+                common += pull[i] * start[at[i]]
+            for i in range(nodes):
+                if pull[i] == 0:
+                    continue
+                slope[at[i]] -= pull[i] * common / weight
+                for j in range(nodes):
+                    hessian[at[i], at[j]] -= pull[i] * pull[j] / weight
+
+
+@njit(**COMPILED)
 def take_nodes(rows: Any, nodes: Any, found: Any) -> None:
     """Write the three columns of each node (q,) of `rows` (n, 3p) to `found` (n, 3q)."""
     for i in range(len(rows)):

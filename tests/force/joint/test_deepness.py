@@ -16,7 +16,7 @@ from gelslim_force.joint.deepness import (
     deepness,
     least_pressure_at,
     light_share_at,
-    traction_sigma_mpa,
+    traction_sigma,
 )
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
@@ -40,14 +40,18 @@ def test_settings_of_shallow_contacts_are_those_given() -> None:
     assert light_share_at(chosen, 0.5) == pytest.approx(mean)
     assert least_pressure_at(chosen, 1.0) == pytest.approx(chosen.deep_least_pressure)
     traction = np.array([[0.0, 0.0, -0.3], [0.0, 0.0, -0.1], [0.0, 0.0, 0.2]])
-    usual = 0.1 * chosen.roughness, 0.1 * chosen.tangential_stress
-    assert traction_sigma_mpa(chosen, 0.0, 0.1, traction) == pytest.approx(usual)
+    usual = traction_sigma(chosen, 0.0, 0.1, traction)
+    assert usual.rough_mpa == pytest.approx(0.1 * chosen.roughness)
+    assert usual.tangential_mpa == pytest.approx(0.1 * chosen.tangential_stress)
+    assert usual.ratio == chosen.shear_ratio
     mean = (0.3**2 + 0.1**2) / 0.4
-    rough, _ = traction_sigma_mpa(chosen, 1.0, 0.1, traction)
-    assert rough == pytest.approx(chosen.deep_roughness * mean)
+    deep = traction_sigma(chosen, 1.0, 0.1, traction)
+    assert deep.rough_mpa == pytest.approx(chosen.deep_roughness * mean)
+    assert deep.ratio == 0
     traction[:, :2] = [[0.12, 0.0], [0.0, 0.16], [0.0, 0.0]]
-    _, tangential = traction_sigma_mpa(chosen, 0.0, 0.1, traction)
-    assert tangential == pytest.approx(chosen.shear_share * mean * 0.2 / 0.4)
+    for deepness_of, share in ((0.0, chosen.shear_share), (1.0, chosen.deep_shear_share)):
+        sheared = traction_sigma(chosen, deepness_of, 0.1, traction)
+        assert sheared.tangential_mpa == pytest.approx(share * mean * 0.2 / 0.4)
 
 
 def test_limits_and_reaches_are_those_of_an_area_and_of_lengths() -> None:
@@ -55,7 +59,7 @@ def test_limits_and_reaches_are_those_of_an_area_and_of_lengths() -> None:
     usual = JointSettings()
     assert usual.on_mesh(USUAL_CELL) == usual
     finer = usual.on_mesh(USUAL_CELL / 2)
-    for name in ("normal_stress", "tangential_stress", "shear_share"):
+    for name in ("normal_stress", "tangential_stress", "shear_share", "deep_shear_share"):
         assert getattr(finer, name) == pytest.approx(2 * getattr(usual, name))
     assert (finer.light_reach, finer.marker_reach) == (4, 12)
     assert finer.roughness == usual.roughness

@@ -67,7 +67,7 @@ def test_pressure_between_inner_nodes_follows_from_these() -> None:
     parts = found.parts(nodes, inner)
     at = places_mm()[parts.places]
     linear = -1 + 0.1 * at[:, 0] - 0.2 * at[:, 1]
-    unknown = np.concatenate([linear[parts.own], np.zeros(2 * len(nodes))])
+    unknown = np.concatenate([linear[parts.own], np.zeros(2 * len(parts.nodes))])
     np.testing.assert_allclose(parts.normal(unknown), linear, atol=1e-12)
     alone = found.parts(nodes, np.zeros(len(points), dtype=bool))
     assert len(alone.own) == len(alone.places) == len(parts.places)
@@ -126,11 +126,11 @@ def test_heights_by_force_are_those_of_each_force(seed: int) -> None:
     unknown, places = rng.normal(size=parts.size), parts.places
     normal, tangential = parts.normal(unknown), unknown[parts.tangential].reshape(-1, 2)
     force = np.zeros_like(points)
-    force[nodes, :2] = tangential
+    force[parts.nodes, :2] = tangential
     force[:, 2] = found.on_nodes(places, normal)
     bearing = np.flatnonzero(force.any(axis=1))
     moved = compliance.displacement(bearing, force[bearing])[:, 2]
-    expected = found.heights(moved, (nodes, tangential), (places, normal))
+    expected = found.heights(moved, (parts.nodes, tangential), (places, normal))
     near = np.sort(rng.choice(len(expected), 60, replace=False))
     given = found.by_force(responses, near, parts) @ unknown
     np.testing.assert_allclose(given, expected[near], atol=3e-5 * np.abs(expected).max())
