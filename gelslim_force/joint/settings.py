@@ -173,6 +173,7 @@ ON_NODES = JointSettings(
 and more of it is used."""
 MARKERS_ALONE = JointSettings(
     marker_mm=0.004,
+    marker_share=0.02,
     tangential_stress=0.07,
     shear_share=0.0,
     deep_shear_share=0.0,
