@@ -69,7 +69,7 @@ def integrals(decay: Any, strip: Any) -> Any:
 
 @njit(**COMPILED)
 def _integral(ratio: Any, table: Any) -> Any:
-    """Integrals of both terms from the middle, by cubic interpolation; constant beyond the table"""
+    """Integrals of both terms from the middle, by cubic interpolation; constant after the table."""
     if ratio < 1.0:
         return 0.5 * ratio * ratio, 0.0
     at = math.sqrt(ratio - 1) * (1 / STEP)

@@ -2,9 +2,8 @@
 
 An object that is drawn along the surface puts tangential tractions on all of its contact, about in
 proportion to the pressure. A prior that keeps each of them small makes their sum too small. Where
-the camera looks at a slant, a marker that is drawn along the line of sight then reads as one that
-is pressed in: the normal force of a contact with a shear of 0.4 is off by some percent, one way or
-the other with the direction. The prior is therefore that of
+the camera looks at a slant, a marker that is drawn along the line of sight looks like one that is
+pressed in, so that the normal force takes up what the shear lacks. The prior is therefore that of
 
     t = s p + d,
 

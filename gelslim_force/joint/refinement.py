@@ -5,8 +5,8 @@ whole. Normal forces on the nodes and half way between them can, up to half a st
 that press. Inside the contact the pressure half way between nodes is the mean of that on the nodes
 around it; only about the rim is it unknown. These forces are found with tangential forces by one
 more linearisation, and go to the nodes with the same resultant and moments. Tangential forces are
-on all nodes that bear some of the normal ones: without those beyond the rim, a shear is explained
-by a deeper contact, or a less deep one, by up to a tenth.
+on all nodes that bear some of the normal ones. Without those beyond the rim, a part of the shear is
+explained by a contact that is deeper, or less deep, by up to a tenth.
 
 The prior is that of the nodes for the same traction, where a node has the area of its part of the
 places. The sum over neighbours of squared
