@@ -36,7 +36,9 @@ def wrench_spread(
     assert sought is not None
     assert markers is not None
     settings, off_design = estimator.settings, estimator.off_design
-    spread = equations.spread_of(sought.sums, sought.free)
+    probes = markers.probes()
+    wanted = np.vstack([sought.sums, probes])
+    spread, probed = np.split(equations.spread_of(wanted, sought.free), [len(sought.sums)])
     covariance = at_edge(state.force_n, estimator.points_mm, estimator.near_edge, settings)
     by_motion, height = markers.by_motion(spread), state.displacement_mm[:, 2]
     by_marker = markers.response(by_motion, estimator.markers.mm_per_px)
@@ -49,8 +51,8 @@ def wrench_spread(
         data = markers.used, by_motion, state.light, spread
         by_gel = off_design.by_parameter(*data, state.force_n)
     if estimator.light is not None:
-        varied = int(np.count_nonzero(sought.free))
-        covariance += spread @ sought.sums.T - markers.overstated(by_motion, varied)
+        determined = markers.determined(probes, probed)
+        covariance += spread @ sought.sums.T - markers.overstated(by_motion, determined)
         return covariance, by_marker, by_gel
     force = state.force_n[nodes]
     covariance += scaled_covariance(equations.hessian, markers, sought.sums, spread, force.ravel())

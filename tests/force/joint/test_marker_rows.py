@@ -46,3 +46,22 @@ def test_the_response_is_the_change_of_the_sums_with_a_marker() -> None:
     by_data = sums @ (inverse @ (rows.T @ (weight * moved)))
     np.testing.assert_allclose(np.einsum("ani,ni->a", found, shift_px), by_data, rtol=1e-9)
     assert not found[:, 1::2].any()
+
+
+def test_the_number_that_is_determined_is_a_trace() -> None:
+    """With a prior, markers determine less than all forces; with none, all of them."""
+    rng = np.random.default_rng(6)
+    rows = rng.normal(size=(2 * COUNT, UNKNOWNS)) * np.geomspace(1, 0.01, UNKNOWNS)
+    weight = rng.uniform(0.5, 2.0, 2 * COUNT)
+    markers = MarkerRows(np.arange(COUNT), rows, np.zeros(2 * COUNT), weight)
+    own = (rows.T * weight) @ rows
+    for prior in (1e-12, 1.0):
+        covariance = np.linalg.inv(own + prior * np.eye(UNKNOWNS))
+        probes = markers.probes()
+        found = markers.determined(probes, probes @ covariance)
+        expected = np.trace(covariance @ own)
+        # Hutchinson's variance, by the number of probes.
+        projection = np.sqrt(weight)[:, None] * rows @ covariance @ (rows.T * np.sqrt(weight))
+        off = projection - np.diag(np.diag(projection))
+        assert abs(found - expected) < 3 * np.sqrt(2 * np.sum(off**2) / len(probes))
+        assert found == pytest.approx(expected, rel=0.3)
