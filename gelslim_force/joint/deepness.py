@@ -68,8 +68,9 @@ def traction_sigma(
     mean = float(pressing @ pressing) / whole
     sheared = mean * float(np.linalg.norm(traction_mpa[:, :2].sum(axis=0))) / whole
     share = (1 - deep) * settings.shear_share + deep * settings.deep_shear_share
+    least = (1 - deep) * settings.tangential_stress + deep * settings.deep_tangential_stress
     return TractionSigma(
         max(settings.roughness * youngs_modulus_mpa, settings.deep_roughness * deep * mean),
-        max(settings.tangential_stress * youngs_modulus_mpa, share * sheared),
+        max(least * youngs_modulus_mpa, share * sheared),
         (1 - deep) * settings.shear_ratio,
     )

