@@ -148,30 +148,39 @@ class NodeLattice:
         mark_adjacent(self.place[nodes], found)
         return found
 
-    def slopes_at(self, points_mm: Array) -> SlopeTaps:
-        """Slopes along x and along y at (n, 2), by the heights of the nodes."""
+    def slopes_at(self, points_mm: Array, blur_mm: float = 0.0) -> SlopeTaps:
+        """Slopes along x and along y at (n, 2), by the heights of the nodes.
+
+        They are means over a blur whose standard deviation `blur_mm` is small next to the spacing.
+        """
         from gelslim_force.joint.kernels.light_kernel import cubic_taps
 
         at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
         nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)
         along, across = np.empty(nodes.shape), np.empty(nodes.shape)
-        cubic_taps(at, self.step_mm, self.number, nodes, along, across)
+        cubic_taps(at, self.step_mm, self._blur(blur_mm), self.number, nodes, along, across)
         return SlopeTaps(nodes, along, across)
 
-    def slopes_about(self, points_mm: Array, close: Mask) -> SlopeTaps:
+    def slopes_about(self, points_mm: Array, close: Mask, blur_mm: float = 0.0) -> SlopeTaps:
         """Slopes at (n, 2) by the heights of every other place, and of all where it matters.
 
         Args:
             points_mm: (n, 2).
             close: (mx, my) places of the lattice of every other place, about which all are used.
+            blur_mm: As in `slopes_at`.
         """
         from gelslim_force.joint.kernels.finer_kernel import taps_of_two_pitches
 
         at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
         nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)
         along, across = np.empty(nodes.shape), np.empty(nodes.shape)
-        taps_of_two_pitches(at, self.step_mm, self.number, close, nodes, along, across)
+        blur = self._blur(blur_mm)
+        taps_of_two_pitches(at, self.step_mm, blur, self.number, close, nodes, along, across)
         return SlopeTaps(nodes, along, across)
+
+    def _blur(self, blur_mm: float) -> Array:
+        """(2,) half the variance of a blur in squared steps."""
+        return np.asarray((blur_mm / self.step_mm) ** 2 / 2)
 
     def interpolation(self, points_mm: Array) -> sparse.csr_array:
         """(n, c) matrix that gives the values at points (n, 2 or 3) by those of the nodes.

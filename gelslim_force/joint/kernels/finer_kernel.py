@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from gelslim_core.kernel_cache import drop_stale
-from gelslim_force.joint.kernels.light_kernel import cubic
+from gelslim_force.joint.kernels.light_kernel import blurred_cubic
 
 drop_stale(["finer_kernel"], ["light_kernel"], Path(__file__).parent)
 
@@ -19,7 +19,7 @@ _TAPS = 4
 
 @njit(**COMPILED)
 def taps_of_two_pitches(
-    at: Any, step: Any, number: Any, close: Any, nodes: Any, along: Any, across: Any
+    at: Any, step: Any, blur: Any, number: Any, close: Any, nodes: Any, along: Any, across: Any
 ) -> None:
     """Places (n, 16), and weights (n, 16) of slopes along x and y, of cubic convolution.
 
@@ -29,6 +29,7 @@ def taps_of_two_pitches(
     Args:
         at: (n, 2) in steps of the finer lattice.
         step: (2,) of the finer lattice.
+        blur: (2,) half the variance of the blur in its squared steps.
         number: (nx, ny) number of each place; -1 where there is none.
         close: (nx, ny) places of the lattice of every other place, about which all are used.
         nodes: Receives the places.
@@ -45,8 +46,8 @@ def taps_of_two_pitches(
         x, y = at[k, 0] / stride, at[k, 1] / stride
         i = min(max(int(np.floor(x)), 0), (rows - 1) // stride - 1)
         j = min(max(int(np.floor(y)), 0), (columns - 1) // stride - 1)
-        cubic(x - i, by_x, steep_x)
-        cubic(y - j, by_y, steep_y)
+        blurred_cubic(x - i, blur[0] / stride**2, by_x, steep_x)
+        blurred_cubic(y - j, blur[1] / stride**2, by_y, steep_y)
         for a in range(_TAPS):
             row = min(max(stride * (i + a - 1), 0), rows - 1)
             for b in range(_TAPS):

@@ -26,12 +26,32 @@ def cubic(t: Any, weight: Any, steep: Any) -> None:
 
 
 @njit(**COMPILED)
-def cubic_taps(at: Any, step: Any, number: Any, nodes: Any, along: Any, across: Any) -> None:
+def blurred_cubic(t: Any, blur: Any, weight: Any, steep: Any) -> None:
+    """`cubic` of the mean over a blur, whose variance is 2 `blur` squared steps: f + blur f″.
+
+    The second derivative is linear between the second differences at the nodes.
+    """
+    cubic(t, weight, steep)
+    weight[0] += blur * (1 - t)
+    weight[1] += blur * (3 * t - 2)
+    weight[2] += blur * (1 - 3 * t)
+    weight[3] += blur * t
+    steep[0] -= blur
+    steep[1] += 3 * blur
+    steep[2] -= 3 * blur
+    steep[3] += blur
+
+
+@njit(**COMPILED)
+def cubic_taps(
+    at: Any, step: Any, blur: Any, number: Any, nodes: Any, along: Any, across: Any
+) -> None:
     """Nodes (n, 16), and weights (n, 16) of slopes along x and y, of cubic convolution.
 
     Args:
         at: (n, 2) in steps of the lattice.
         step: (2,) of the lattice.
+        blur: (2,) half the variance of the blur in squared steps.
         number: (nx, ny) number of the node at each place; -1 where there is none.
         nodes: Receives the nodes.
         along: Receives the weights along x; 0 where there is no node.
@@ -43,8 +63,8 @@ def cubic_taps(at: Any, step: Any, number: Any, nodes: Any, along: Any, across: 
     for k in range(len(at)):
         i = min(max(int(np.floor(at[k, 0])), 0), rows - 2)
         j = min(max(int(np.floor(at[k, 1])), 0), columns - 2)
-        cubic(at[k, 0] - i, by_x, steep_x)
-        cubic(at[k, 1] - j, by_y, steep_y)
+        blurred_cubic(at[k, 0] - i, blur[0], by_x, steep_x)
+        blurred_cubic(at[k, 1] - j, blur[1], by_y, steep_y)
         for a in range(_TAPS):
             row = min(max(i + a - 1, 0), rows - 1)
             for b in range(_TAPS):

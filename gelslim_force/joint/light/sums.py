@@ -170,12 +170,13 @@ def placed_bins(
     def of(layers: Any) -> Any:
         return np.take(layers.reshape(*layers.shape[:-2], -1), bins, axis=-1)
 
-    taps, slope = lattice.slopes_at(places), None
+    taps, slope = lattice.slopes_at(places, view.blur_mm), None
     turn = taps.turn(displacement_mm[:, :2])
     if finer is not None and close is not None:
-        taps = finer[0].slopes_about(places, lattice.picture(close))
+        taps = finer[0].slopes_about(places, lattice.picture(close), view.blur_mm)
     elif finer is not None:
-        slope = np.einsum("nij,nj->ni", turn, finer[0].slopes_at(places).slopes(finer[1]))
+        blurred = finer[0].slopes_at(places, view.blur_mm).slopes(finer[1])
+        slope = np.einsum("nij,nj->ni", turn, blurred)
     taps = taps.turned(turn)
     return PlacedBins(
         taps,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,8 @@ _SHOWN = 0.25
 _QUIET, _ROWS = 3.0, 4
 """Standard deviations up to which a bin's change is noise, and rows of bins for one that is read
 for the correlation of the noise."""
+_BLUR_PX = 1.0
+"""Standard deviation of the blur of a usual picture."""
 _DISC, _RIM_PX = 1.5, 1.0
 """A marker's pixels, over its radius and beyond it, that are left out."""
 
@@ -71,6 +74,7 @@ class LightView:
             `NodeLattice.place_number`.
         lean: (rows, columns, 2) motion of that place along the line of sight per mm of height.
         area_mm2: (rows, columns) of a bin on the gel.
+        blur_mm: Standard deviation of the places that a bin shows: its side, and the blur.
         level: (c, rows, columns) grey value of the reference over itself plus the floor.
         share: (k, c, rows, columns) share of each source in the light of each channel.
         mean_share: (k, c) its mean over the picture.
@@ -99,6 +103,8 @@ class LightView:
         x, y, self.lean, _ = bin_positions(self._light, camera)
         self.rest_mm = np.stack([x, y], axis=-1)
         self.area_mm2 = bin_sizes(x, y) ** 2
+        side_mm = math.sqrt(float(np.nanmedian(self.area_mm2)))
+        self.blur_mm = side_mm * math.sqrt(1 / 12 + (_BLUR_PX / bin_px) ** 2)
         places = self.rest_mm.reshape(-1, 2)
         self._light.on_pad &= lattice.on(places).reshape(x.shape)
         self.nearest = lattice.nearest_node(places)

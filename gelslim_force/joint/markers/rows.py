@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -85,8 +86,8 @@ class MarkerRows:
 
     def probes(self) -> Array:
         """(k, q) sums of the weighted rows with random signs; see `determined`."""
-        signs = np.random.default_rng(0).choice([-1.0, 1.0], (_PROBES, len(self.weight)))
-        return np.asarray((signs * np.sqrt(self.weight)).astype(self.rows.dtype) @ self.rows)
+        weighted = _signs(len(self.weight)) * np.sqrt(self.weight)
+        return np.asarray(weighted.astype(self.rows.dtype) @ self.rows)
 
     def determined(self, probes: Array, spread: Array) -> float:
         """Number of combinations of the forces that the markers determine.
@@ -117,6 +118,12 @@ class MarkerRows:
         seen = float(self.weight @ np.square(self.residual)) / max(count, 1.0)
         gain = by_motion.reshape(len(by_motion), -1) / np.sqrt(self.weight)
         return np.asarray(max(0.0, 1.0 - seen) * gain @ gain.T)
+
+
+@lru_cache(maxsize=64)
+def _signs(count: int) -> Array:
+    """(k, count) random signs, the same each time."""
+    return np.random.default_rng(0).choice([-1.0, 1.0], (_PROBES, count))
 
 
 def rms_length(rows: Array) -> float:

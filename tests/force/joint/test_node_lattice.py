@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
@@ -45,6 +46,31 @@ def test_slopes_of_a_wave_converge_with_the_square_of_the_spacing() -> None:
         errors.append(np.sqrt(np.mean((along - np.cos(at[:, 0])) ** 2)))
     rate = np.polyfit(np.log([12, 24, 48]), np.log(errors), 1)[0]
     assert rate < -1.8
+
+
+def test_slopes_over_a_blur_of_a_cubic_height_are_exact() -> None:
+    """The mean of 3 x² over a blur of the variance v is 3 (x² + v), that of 2 x y stays."""
+    found, nodes = lattice()
+    at, blur_mm = inner(60), 0.3
+    height = nodes[:, 0] ** 3 + nodes[:, 0] ** 2 * nodes[:, 1]
+    sharp, blurred = (found.slopes_at(at, b).slopes(height) for b in (0.0, blur_mm))
+    np.testing.assert_allclose(blurred[:, 0] - sharp[:, 0], 3 * blur_mm**2, rtol=1e-9)
+    np.testing.assert_allclose(blurred[:, 1] - sharp[:, 1], blur_mm**2, rtol=1e-9)
+
+
+def test_slopes_of_a_wave_over_a_blur_are_weaker() -> None:
+    """By exp(-v k² / 2) with the variance v and the wave number k."""
+    axis = np.linspace(0, 6, 49)
+    nodes = np.column_stack([a.ravel() for a in np.meshgrid(axis, axis, indexing="ij")])
+    found = NodeLattice.of(nodes, np.full(2, axis[1]))
+    at = np.random.default_rng(1).uniform(1.5, 4.5, (200, 2))
+    height = np.sin(2 * nodes[:, 0])
+    everywhere = np.ones((25, 25), dtype=bool)
+    for near in (everywhere, ~everywhere):
+        along = found.slopes_about(at, near, 0.1).slopes(height)[:, 0]
+        exact = 2 * np.exp(-(0.1**2) * 2**2 / 2) * np.cos(2 * at[:, 0])
+        share = np.dot(along, exact) / np.dot(exact, exact)
+        assert share == pytest.approx(1.0, abs=0.003 if near.all() else 0.012)
 
 
 def test_slopes_of_a_deformed_surface_are_those_of_the_moved_plane() -> None:
