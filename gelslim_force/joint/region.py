@@ -34,6 +34,9 @@ _LEAST_ACROSS = 0.1
 """Sensitivity, or difference of those of two channels, that shows a slope across."""
 _GROWS_FAST = 0.1
 """Share of the nodes seen that are new in one frame and not next to those seen before."""
+_NOISY, _SPARSE = 0.055, 4
+"""Noise of the logarithm of a bin's light from which single bins do not tell a contact, and steps
+between bins that are read for it."""
 _FAINT = 2 / 3
 """Mean pressure of a contact, over that of all, below which it is judged by the latter."""
 _DENT, _LEAST_DENT = 0.25, 0.1
@@ -154,7 +157,7 @@ def changed_bins(shading: ShadingChange) -> Mask:
     """
     from gelslim_force.joint.kernels.region_kernel import bins_above_noise
 
-    if shading.grain is not None and shading.grain[:2].max() > 1:
+    if _is_coarse(shading):
         return _whole(widened(opened(_changed_widely(shading), _OPENED), _RIM))
     changed, box = np.empty(shading.valid.shape, dtype=bool), np.empty(4, dtype=np.intp)
     noise, valid = shading.noise[:2], shading.valid
@@ -166,10 +169,22 @@ def changed_bins(shading: ShadingChange) -> Mask:
     return found
 
 
-def _changed_widely(shading: ShadingChange) -> Mask:
-    """Bins around which the light changed on average, with errors that reach over several bins.
+def _is_coarse(shading: ShadingChange) -> bool:
+    """Whether single bins do not tell a contact: errors reach over several of them, or are large.
 
-    Squares of single bins hardly tell a contact from such errors. A contact changes the light over
+    With noise of 25 grey values single bins showed half of a contact, or less.
+    """
+    if shading.grain is not None and shading.grain[:2].max() > 1:
+        return True
+    some = shading.noise[0, ::_SPARSE, ::_SPARSE][shading.valid[::_SPARSE, ::_SPARSE]]
+    return len(some) > 0 and float(np.median(some)) > _NOISY
+
+
+def _changed_widely(shading: ShadingChange) -> Mask:
+    """Bins around which the light changed on average.
+
+    Squares of single bins hardly tell a contact from errors that reach over several bins, or are
+    large. A contact changes the light over
     more than a millimetre to the same side, which a mean over that shows much better.
     """
     valid = shading.valid.astype(np.float32)
