@@ -100,28 +100,28 @@ def test_the_stored_errors_of_strong_presses_are_small() -> None:
         assert row["refused"] <= 2
         assert reached["normal"] < normal
         assert reached["normal_95"] < normal_95
-        # With a calibrated light all forces are found 0.6 to 0.9 % too small.
-        common = 0.005 if "light calibrated" in known else TRUTH
+        # With a calibrated light all forces are found 0.5 to 0.8 % too small.
+        common = 0.004 if "light calibrated" in known else TRUTH
         assert abs(reached["mean"]) < 2 * reached["mean_sigma"] + common
         assert reached["shear"] < 0.01
         assert reached["centre_mm"] < 0.1
         assert reached["field"] < 0.22
         z = np.array(row["error_mn"]) / np.array(row["sigma_mn"])
         rms, inside = np.sqrt((z**2).mean(axis=0)), (np.abs(z) < 1.96).mean(axis=0)
-        # With a known gel the deviations are up to a third too careful.
-        assert ((rms > 0.65) & (rms < RMS[1])).all()
+        # With a known gel the deviations are up to a quarter too careful.
+        assert ((rms > 0.75) & (rms < RMS[1])).all()
         assert (inside > COVERAGE[0]).all()
 
 
 def test_the_stored_scores_of_deep_contacts_hold() -> None:
-    """Near the gate: deviations are up to a third too large, coverage lacks up to 2 %."""
+    """Coverage lacks up to 2 %."""
     deep = json.loads(STORED.read_text("utf-8"))["deep"]
     assert set(deep) == {"linear", "auto"}
     for law, row in deep.items():
         z = np.array(row["error_mn"]) / np.array(row["sigma_mn"])
         assert len(z) + row["refused"] >= 40
         rms, inside = np.sqrt((z**2).mean(axis=0)), (np.abs(z) < 1.96).mean(axis=0)
-        assert (rms > 0.7).all(), law
+        assert (rms > RMS[0]).all(), law
         assert (rms < RMS[1]).all(), law
         assert (inside > 0.88).all(), law
     assert deep["auto"]["relative"]["normal"] < 0.5 * deep["linear"]["relative"]["normal"]
