@@ -132,7 +132,7 @@ class NodeLattice:
 
     def values_at(self, values: Array, points_mm: Array) -> Array:
         """Bilinear interpolation (n, ...) of nodal values (c, ...) at points (n, 2)."""
-        from gelslim_force.joint.kernels.light_kernel import bilinear
+        from gelslim_force.joint.kernels.taps_kernel import bilinear
 
         at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
         columns = np.ascontiguousarray(values, dtype=float).reshape(len(values), -1)
@@ -153,7 +153,7 @@ class NodeLattice:
 
         They are means over a blur whose standard deviation `blur_mm` is small next to the spacing.
         """
-        from gelslim_force.joint.kernels.light_kernel import cubic_taps
+        from gelslim_force.joint.kernels.taps_kernel import cubic_taps
 
         at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
         nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)
@@ -169,7 +169,7 @@ class NodeLattice:
             close: (mx, my) places of the lattice of every other place, about which all are used.
             blur_mm: As in `slopes_at`.
         """
-        from gelslim_force.joint.kernels.finer_kernel import taps_of_two_pitches
+        from gelslim_force.joint.kernels.taps_kernel import taps_of_two_pitches
 
         at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
         nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)

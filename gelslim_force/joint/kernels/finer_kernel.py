@@ -2,61 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numba import njit
 
-from gelslim_core.kernel_cache import drop_stale
-from gelslim_force.joint.kernels.light_kernel import blurred_cubic
-
-drop_stale(["finer_kernel"], ["light_kernel"], Path(__file__).parent)
-
 COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-_TAPS = 4
-
-
-@njit(**COMPILED)
-def taps_of_two_pitches(
-    at: Any, step: Any, blur: Any, number: Any, close: Any, nodes: Any, along: Any, across: Any
-) -> None:
-    """Places (n, 16), and weights (n, 16) of slopes along x and y, of cubic convolution.
-
-    The interpolation uses all places of a finer lattice about the places marked in `close`, and
-    only every other place elsewhere.
-
-    Args:
-        at: (n, 2) in steps of the finer lattice.
-        step: (2,) of the finer lattice.
-        blur: (2,) half the variance of the blur in its squared steps.
-        number: (nx, ny) number of each place; -1 where there is none.
-        close: (nx, ny) places of the lattice of every other place, about which all are used.
-        nodes: Receives the places.
-        along: Receives the weights along x; 0 where there is no place.
-        across: Receives those along y.
-    """
-    rows, columns = number.shape
-    by_x, by_y = np.empty(_TAPS), np.empty(_TAPS)
-    steep_x, steep_y = np.empty(_TAPS), np.empty(_TAPS)
-    for k in range(len(at)):
-        row = min(max(round(at[k, 0] / 2), 0), close.shape[0] - 1)
-        column = min(max(round(at[k, 1] / 2), 0), close.shape[1] - 1)
-        stride = 1 if close[row, column] else 2
-        x, y = at[k, 0] / stride, at[k, 1] / stride
-        i = min(max(int(np.floor(x)), 0), (rows - 1) // stride - 1)
-        j = min(max(int(np.floor(y)), 0), (columns - 1) // stride - 1)
-        blurred_cubic(x - i, blur[0] / stride**2, by_x, steep_x)
-        blurred_cubic(y - j, blur[1] / stride**2, by_y, steep_y)
-        for a in range(_TAPS):
-            row = min(max(stride * (i + a - 1), 0), rows - 1)
-            for b in range(_TAPS):
-                node = number[row, min(max(stride * (j + b - 1), 0), columns - 1)]
-                tap = _TAPS * a + b
-                held = 1.0 if node >= 0 else 0.0
-                nodes[k, tap] = max(node, 0)
-                along[k, tap] = held * steep_x[a] * by_y[b] / (stride * step[0])
-                across[k, tap] = held * by_x[a] * steep_y[b] / (stride * step[1])
 
 
 @njit(**COMPILED)
