@@ -6,7 +6,7 @@ import hashlib
 import io
 import json
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from bench.page.ladder_record import LadderRecord, RungRecord
 
@@ -16,8 +16,11 @@ COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57", "#7a3f8f", "#b59b00", "#30a0b0", "#c
 OURS, PAPER, FRONT = "#d62728", "#000000", "#9aa3ad"
 NEGLIGIBLE = 1e-6
 """Of a ladder's largest error: what is below is drawn there, as an open triangle."""
-NAME_PX = 150.0, 14.0
-"""Width and height in which names would lie on each other."""
+_SIDES = (1, 3), (1, -10), (-1, 3), (-1, -10)
+"""Places of a name: to the right or left of its point, and above or below, in points."""
+_DOT_PX = 3.0
+_NAME_PT, _LETTER = 7.5, 0.52
+"""Size of the names, and the usual width of a letter over it."""
 MOST_NAMES = {"ladder": 20, "problems": 8, "omissions": 30}
 KEY = "Ladder"
 """PNG text that says from which record a figure was drawn."""
@@ -93,20 +96,42 @@ def _points(axes: Any, ladder: LadderRecord) -> None:
 
 
 def _names(axes: Any, ladder: LadderRecord) -> None:
-    """Beside the points, on the side where there is room; lower where a name is just above."""
-    low, high = axes.get_xlim()
-    places: list[tuple[float, float]] = []
+    """Beside the points, at the first place that lies on no other name or point."""
+    point_px = axes.figure.dpi / 72
+    left, right = (axes.transData.transform((x, 1.0))[0] for x in axes.get_xlim())
+    spots = [axes.transData.transform(_spot(ladder, r)) for r in ladder.rungs]
+    taken = [_Box(x - _DOT_PX, y - _DOT_PX, 2 * _DOT_PX, 2 * _DOT_PX) for x, y in spots]
     for rung in sorted(_named(ladder), key=lambda r: _spot(ladder, r)[1], reverse=True):
-        time, error = _spot(ladder, rung)
-        x, y = axes.transData.transform((time, error))
-        crowded = any(abs(x - a) < NAME_PX[0] and b - y < NAME_PX[1] for a, b in places)
-        places.append((x, y))
-        on_left = math.log(time / low) > 0.78 * math.log(high / low)
+        (x, y), name = axes.transData.transform(_spot(ladder, rung)), _short(ladder, rung)
+        size = _NAME_PT * _LETTER * len(name) * point_px, _NAME_PT * point_px
+        boxes = {
+            (side, up): _Box(
+                x + 7 * side * point_px - (side < 0) * size[0], y + up * point_px, *size
+            )
+            for side, up in _SIDES
+        }
+        inside = {k: b for k, b in boxes.items() if b.x > left and b.x + b.width < right}
+        free = [k for k, b in inside.items() if not any(b.meets(other) for other in taken)]
+        side, up = (free or list(inside) or list(boxes))[0]
+        taken.append(boxes[side, up])
         axes.annotate(
-            _short(ladder, rung), (time, error),
-            xytext=(-7 if on_left else 7, -10 if crowded else 3), fontsize=7.5,
-            textcoords="offset points", color="#333a44", ha="right" if on_left else "left",
+            name, _spot(ladder, rung), xytext=(7 * side, up), fontsize=_NAME_PT,
+            textcoords="offset points", color="#333a44", ha="right" if side < 0 else "left",
         )  # fmt: skip
+
+
+class _Box(NamedTuple):
+    """A rectangle in pixels, by its lower left corner."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def meets(self, other: _Box) -> bool:
+        """Whether it lies on another one."""
+        across = self.x < other.x + other.width and other.x < self.x + self.width
+        return across and self.y < other.y + other.height and other.y < self.y + self.height
 
 
 def _named(ladder: LadderRecord) -> list[RungRecord]:
