@@ -126,7 +126,7 @@ def follows(truth: Pressed) -> None:
     assert single.wrench is not None
     assert found.field is not None
     apart = np.abs(found.wrench.vector - single.wrench.vector)
-    assert (apart <= 0.5 * found.wrench.standard_deviation).all()
+    assert (apart <= 0.7 * found.wrench.standard_deviation).all()
     if not truth.wrench.any():
         assert not found.field.force_n[:, 2].any()
         return
