@@ -42,6 +42,32 @@ def blurred_cubic(t: Any, blur: Any, weight: Any, steep: Any) -> None:
 
 
 @njit(**COMPILED)
+def _taps_of_point(
+    k: Any, at: Any, stride: Any, step: Any, blur: Any, number: Any, by_x: Any, steep_x: Any,
+    by_y: Any, steep_y: Any, nodes: Any, along: Any, across: Any,
+) -> None:  # fmt: skip
+    """The taps of point k by every node of a lattice, or every `stride`-th one.
+
+    Arguments as in `cubic_taps`; the weights by x and y and their derivatives (4,) are overwritten.
+    """
+    rows, columns = number.shape
+    x, y = at[k, 0] / stride, at[k, 1] / stride
+    i = min(max(int(np.floor(x)), 0), (rows - 1) // stride - 1)
+    j = min(max(int(np.floor(y)), 0), (columns - 1) // stride - 1)
+    blurred_cubic(x - i, blur[0] / stride**2, by_x, steep_x)
+    blurred_cubic(y - j, blur[1] / stride**2, by_y, steep_y)
+    for a in range(_TAPS):
+        row = min(max(stride * (i + a - 1), 0), rows - 1)
+        for b in range(_TAPS):
+            node = number[row, min(max(stride * (j + b - 1), 0), columns - 1)]
+            tap = _TAPS * a + b
+            held = 1.0 if node >= 0 else 0.0
+            nodes[k, tap] = max(node, 0)
+            along[k, tap] = held * steep_x[a] * by_y[b] / (stride * step[0])
+            across[k, tap] = held * by_x[a] * steep_y[b] / (stride * step[1])
+
+
+@njit(**COMPILED)
 def cubic_taps(
     at: Any, step: Any, blur: Any, number: Any, nodes: Any, along: Any, across: Any
 ) -> None:
@@ -56,23 +82,12 @@ def cubic_taps(
         along: Receives the weights along x; 0 where there is no node.
         across: Receives those along y.
     """
-    rows, columns = number.shape
-    by_x, by_y = np.empty(_TAPS), np.empty(_TAPS)
-    steep_x, steep_y = np.empty(_TAPS), np.empty(_TAPS)
+    by_x, steep_x = np.empty(_TAPS), np.empty(_TAPS)
+    by_y, steep_y = np.empty(_TAPS), np.empty(_TAPS)
     for k in range(len(at)):
-        i = min(max(int(np.floor(at[k, 0])), 0), rows - 2)
-        j = min(max(int(np.floor(at[k, 1])), 0), columns - 2)
-        blurred_cubic(at[k, 0] - i, blur[0], by_x, steep_x)
-        blurred_cubic(at[k, 1] - j, blur[1], by_y, steep_y)
-        for a in range(_TAPS):
-            row = min(max(i + a - 1, 0), rows - 1)
-            for b in range(_TAPS):
-                node = number[row, min(max(j + b - 1, 0), columns - 1)]
-                tap = _TAPS * a + b
-                held = 1.0 if node >= 0 else 0.0
-                nodes[k, tap] = max(node, 0)
-                along[k, tap] = held * steep_x[a] * by_y[b] / step[0]
-                across[k, tap] = held * by_x[a] * steep_y[b] / step[1]
+        _taps_of_point(
+            k, at, 1, step, blur, number, by_x, steep_x, by_y, steep_y, nodes, along, across
+        )
 
 
 @njit(**COMPILED)
@@ -94,27 +109,15 @@ def taps_of_two_pitches(
         along: Receives the weights along x; 0 where there is no place.
         across: Receives those along y.
     """
-    rows, columns = number.shape
-    by_x, by_y = np.empty(_TAPS), np.empty(_TAPS)
-    steep_x, steep_y = np.empty(_TAPS), np.empty(_TAPS)
+    by_x, steep_x = np.empty(_TAPS), np.empty(_TAPS)
+    by_y, steep_y = np.empty(_TAPS), np.empty(_TAPS)
     for k in range(len(at)):
         row = min(max(round(at[k, 0] / 2), 0), close.shape[0] - 1)
         column = min(max(round(at[k, 1] / 2), 0), close.shape[1] - 1)
         stride = 1 if close[row, column] else 2
-        x, y = at[k, 0] / stride, at[k, 1] / stride
-        i = min(max(int(np.floor(x)), 0), (rows - 1) // stride - 1)
-        j = min(max(int(np.floor(y)), 0), (columns - 1) // stride - 1)
-        blurred_cubic(x - i, blur[0] / stride**2, by_x, steep_x)
-        blurred_cubic(y - j, blur[1] / stride**2, by_y, steep_y)
-        for a in range(_TAPS):
-            row = min(max(stride * (i + a - 1), 0), rows - 1)
-            for b in range(_TAPS):
-                node = number[row, min(max(stride * (j + b - 1), 0), columns - 1)]
-                tap = _TAPS * a + b
-                held = 1.0 if node >= 0 else 0.0
-                nodes[k, tap] = max(node, 0)
-                along[k, tap] = held * steep_x[a] * by_y[b] / (stride * step[0])
-                across[k, tap] = held * by_x[a] * steep_y[b] / (stride * step[1])
+        _taps_of_point(
+            k, at, stride, step, blur, number, by_x, steep_x, by_y, steep_y, nodes, along, across
+        )
 
 
 @njit(**COMPILED)
