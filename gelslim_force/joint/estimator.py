@@ -40,14 +40,13 @@ from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.node_relief import NodeRelief
 from gelslim_force.joint.normal_equations import TOLERANCE, Linearised, NormalEquations
 from gelslim_force.joint.off_design import OffDesign
-from gelslim_force.joint.region import contact_nodes, pressing_nodes, rise_of
+from gelslim_force.joint.region import contact_nodes, pressing_nodes
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.rounds import Steps, finished, solutions
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.strained_gel import Excess, StrainedGel
 from gelslim_force.motion.marker_motion import MarkerRays, MarkerView
 from gelslim_force.tracking.drift_filter import FrameDrift
-from gelslim_optics.light.light_law import LightLaw
 from ifem_export.operators.adjoint_fields import rigid_motions
 
 Array = NDArray[np.float64]
@@ -76,7 +75,6 @@ class JointEstimator:
         marker_node: (n,) the node nearest to each marker.
         by_height: (n, 2) lateral motion that a picture shows per mm less of the marker's height.
         light: The bins of the picture; None where the markers alone are used.
-        law: Change of light with the slope; None without light.
         youngs_modulus_mpa: Of the gel.
         settings: What is assumed.
         moved: Finds the region where there is no light.
@@ -99,7 +97,6 @@ class JointEstimator:
     marker_node: Nodes
     by_height: Array
     light: LightView | None
-    law: LightLaw | None
     youngs_modulus_mpa: float
     settings: JointSettings
     moved: MovedRegion | None = None
@@ -170,9 +167,7 @@ class JointEstimator:
     def _region(self, frame: FrameData) -> Mask:
         """(c,) nodes that the frame shows as possibly in contact."""
         if self.light is not None and frame.seen is not None:
-            assert self.law is not None
-            by_slope = self.law.sensitivity[:, 1] @ self.light.mean_share
-            rise = rise_of(by_slope, frame.seen.log_change)
+            rise = self.light.rise(frame.seen)
             return contact_nodes(frame.seen.shading, rise, self.light.place, self.lattice)
         if self.moved is None:
             return np.zeros(len(self.points_mm), dtype=bool)
@@ -296,7 +291,7 @@ class JointEstimator:
 
         It is by the heights of the nodes, or those (f,) of the finer surface if they are given.
         """
-        if self.light is None or self.law is None or frame.seen is None:
+        if self.light is None or frame.seen is None:
             return None
         wide = self.lattice.widened(near, self.settings.light_reach)
         relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
@@ -309,7 +304,7 @@ class JointEstimator:
         share = light_share_at(self.settings, self.deepness(state))
         error = math.hypot(self.settings.light_error, share * rms_length(bins.change.T))
         height = moved_mm[:, 2] if finer_mm is None else finer_mm
-        return bins.sums(self.law, height, state.gain, error)
+        return bins.sums(height, state.gain, error)
 
     @cached_property
     def around(self) -> sparse.csr_array:

@@ -30,8 +30,6 @@ bins, its smallest square over the noise, averaged over two layers, and steps be
 the rim of a contact, where it is smaller."""
 _CLOSED, _OPENED = 4, 1
 """Steps by which gaps, such as dots, are closed, and by which specks are removed."""
-_LEAST_ACROSS = 0.1
-"""Sensitivity, or difference of those of two channels, that shows a slope across."""
 _GROWS_FAST = 0.1
 """Share of the nodes seen that are new in one frame and not next to those seen before."""
 _NOISY, _SPARSE = 0.055, 4
@@ -68,20 +66,6 @@ def contact_nodes(
     dent = _dent(lattice, places[seen], rise[seen])
     whole = filled(closed(lattice.picture(region) | dent, 1))
     return np.asarray(whole[lattice.place[:, 0], lattice.place[:, 1]])
-
-
-def rise_of(by_slope: Array, log_change: Array) -> Array | None:
-    """Change (rows, columns) that grows with a rise along y; None where no light tells it.
-
-    Args:
-        by_slope: (c,) loss of light of each channel per unit slope along y.
-        log_change: (c, rows, columns) of their light.
-    """
-    if len(by_slope) == 1:
-        falling, change = by_slope[0], log_change[0]
-    else:
-        falling, change = by_slope[0] - by_slope[1], log_change[0] - log_change[1]
-    return None if abs(falling) < _LEAST_ACROSS else np.asarray(-np.sign(falling) * change)
 
 
 def _continued(region: Mask, hidden: Mask, lattice: NodeLattice) -> Mask:

@@ -33,7 +33,6 @@ from gelslim_force.layer.beyond_mesh import (
     half_step_response,
 )
 from gelslim_force.motion.marker_motion import MarkerView
-from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.compliance.compliance_change import ComplianceChange
@@ -91,7 +90,7 @@ def unknown_shape(
     to_markers, by_height = marker_to_node(points_mm, view.rest_mm), view.by_height()
     seen = None
     if reference is not None:
-        seen = _light_view(bundle, calibration, reference, lattice, light)
+        seen = _light_view(bundle, calibration, reference, lattice, (chosen.gamma, light))
     layers, compliance = EndlessLayers.of(bundle), SurfaceCompliance(bundle, skin=skin)
     finer = None if seen is None else _finer_pressure(layers, lattice)
     discs = NearMotion.of(layers, _disc_mm(calibration, view))
@@ -107,7 +106,6 @@ def unknown_shape(
         lattice.nearest_node(view.rest_mm[:, :2]),
         by_height,
         seen,
-        None if seen is None else LightLaw.of(_traced(bundle), chosen.gamma),
         bundle.material.youngs_modulus_mpa,
         chosen,
         finer=None if finer is None else finer.surface,
@@ -189,8 +187,9 @@ def _light_view(
     calibration: Calibration,
     reference: NDArray[np.uint8],
     lattice: NodeLattice,
-    light: LightCalibration | None,
+    camera: tuple[float, LightCalibration | None],
 ) -> LightView:
+    """The bins of the pictures; `camera` is the exponent and the light as built."""
     return LightView(
         calibration.camera,
         upright(reference, calibration.camera),
@@ -198,7 +197,7 @@ def _light_view(
         _radii_px(calibration),
         lattice,
         _traced(bundle),
-        light,
+        *camera,
     )
 
 

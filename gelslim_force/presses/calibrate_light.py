@@ -26,7 +26,6 @@ from gelslim_force.presses.load_table import Load
 from gelslim_force.presses.press_error import PressError
 from gelslim_force.presses.press_model import PressModel, skin_length_mm
 from gelslim_force.presses.seen_press import PressView
-from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.operators.single_thread import single_threaded
 
@@ -102,11 +101,10 @@ def calibrate_light(
     fitted = fit_gel(*found, prior)
     traced = LightMap.from_arrays(bundle.light)
     lights, channels = _lights(view, reference, traced, pictures, fitted)
-    law = LightLaw.of(traced, JointSettings().gamma)
     points = np.asarray(bundle.mesh.surface_mm)[:, :2]
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     half = np.ptp(points, axis=0) / 2
-    light = fit_light(lights, law, middle, half)
+    light = fit_light(lights, middle, half)
     _require_explained(light, list(pictures))
     layer = GelLaw.of_layer(view.thickness_mm * float(np.exp(fitted.log_thickness)))
     use = GelUse.of_depths(layer, (press.depth_mm for press in fitted.presses))
@@ -117,7 +115,7 @@ def calibrate_light(
         half,
         light.gain,
         light.covariance,
-        law.gamma,
+        JointSettings().gamma,
         _gain_sigma(light),
         float(np.sqrt(np.mean(light.light_error**2))),
         ball_mm,
@@ -164,6 +162,7 @@ def _lights(
             np.asarray(bundle.mesh.surface_mm), np.asarray(bundle.mesh.cell_size_mm[:2])
         ),
         traced,
+        JointSettings().gamma,
     )
     thickness = view.thickness_mm * float(np.exp(gel.log_thickness))
     lights = []

@@ -47,6 +47,7 @@ class PressLight:
         share: (k, c, n) of each source.
         level: (c, n).
         area_mm2: (n,) of the bins.
+        law: Change of light with the slope there, as traced.
     """
 
     places_mm: Array
@@ -56,6 +57,7 @@ class PressLight:
     share: Array
     level: Array
     area_mm2: Array
+    law: LightLaw
 
 
 def press_light(
@@ -98,6 +100,7 @@ def press_light(
         of(view.share),
         of(view.level),
         of(view.area_mm2),
+        view.law.taken(bins),
     )
 
 
@@ -128,14 +131,11 @@ class FittedLight:
     press_gain: Array
 
 
-def fit_light(
-    presses: Sequence[PressLight], law: LightLaw, middle_mm: Array, half_mm: Array
-) -> FittedLight:
+def fit_light(presses: Sequence[PressLight], middle_mm: Array, half_mm: Array) -> FittedLight:
     """Fit the gains of all channels.
 
     Args:
         presses: p presses.
-        law: Change of light with the slope, as traced.
         middle_mm: (2,) middle of the gel.
         half_mm: (2,) half its length and width.
     """
@@ -151,31 +151,29 @@ def fit_light(
         hessian = np.tile(np.diag(prior), (count, 1, 1))
         slope = prior * (start - gain)
         for press, rows in zip(presses, terms, strict=True):
-            left, by_gain, weight = _linear(press, law, np.maximum(gain @ rows.T, 0.1), error)
+            left, by_gain, weight = _linear(press, np.maximum(gain @ rows.T, 0.1), error)
             for channel in range(count):
                 data = rows * by_gain[channel][:, None]
                 hessian[channel] += (data * weight[channel][:, None]).T @ data
                 slope[channel] += data.T @ (weight[channel] * left[channel])
         covariance = np.asarray(np.linalg.inv(hessian), dtype=float)
         gain = gain + np.einsum("cij,cj->ci", covariance, slope)
-        error = np.maximum(_error_per_mm2(presses, terms, law, gain), 0.005)
+        error = np.maximum(_error_per_mm2(presses, terms, gain), 0.005)
     ones = np.zeros_like(gain)
     ones[:, 0] = 1.0
     return FittedLight(
         gain,
         covariance,
         error,
-        _explained(presses, terms, law, gain),
-        _explained(presses, terms, law, ones),
-        _press_gains(presses, terms, law, gain, error),
+        _explained(presses, terms, gain),
+        _explained(presses, terms, ones),
+        _press_gains(presses, terms, gain, error),
     )
 
 
-def _linear(
-    press: PressLight, law: LightLaw, gain: Array, error: Array
-) -> tuple[Array, Array, Array]:
+def _linear(press: PressLight, gain: Array, error: Array) -> tuple[Array, Array, Array]:
     """What is left (c, n) at a gain (c, n), its derivative by the gain, and the weights."""
-    model, _, by_gain = law.change(press.slope, press.share, press.level, gain)
+    model, _, by_gain = press.law.change(press.slope, press.share, press.level, gain)
     left = press.change - model
     sigma = np.hypot(error[:, None] / np.sqrt(press.area_mm2), press.noise)
     usable = np.isfinite(sigma)
@@ -183,13 +181,11 @@ def _linear(
     return left, by_gain, weight
 
 
-def _error_per_mm2(
-    presses: Sequence[PressLight], terms: Sequence[Array], law: LightLaw, gain: Array
-) -> Array:
+def _error_per_mm2(presses: Sequence[PressLight], terms: Sequence[Array], gain: Array) -> Array:
     """(c,) root mean square over squares of 1 mm² of what is left; robust against a bad press."""
     means: list[list[float]] = [[] for _ in gain]
     for press, rows in zip(presses, terms, strict=True):
-        model, _, _ = law.change(press.slope, press.share, press.level, gain @ rows.T)
+        model, _, _ = press.law.change(press.slope, press.share, press.level, gain @ rows.T)
         cells = np.floor(press.places_mm / _CELL_MM).astype(int)
         _, cell = np.unique(cells, axis=0, return_inverse=True)
         for channel, left in enumerate(press.change - model):
@@ -201,13 +197,11 @@ def _error_per_mm2(
     return np.array([np.sqrt(np.mean(np.square(values))) for values in means])
 
 
-def _explained(
-    presses: Sequence[PressLight], terms: Sequence[Array], law: LightLaw, gain: Array
-) -> Array:
+def _explained(presses: Sequence[PressLight], terms: Sequence[Array], gain: Array) -> Array:
     """(p, c) share of the squared change that gains (c, 6) explain."""
     found = []
     for press, rows in zip(presses, terms, strict=True):
-        model, _, _ = law.change(press.slope, press.share, press.level, gain @ rows.T)
+        model, _, _ = press.law.change(press.slope, press.share, press.level, gain @ rows.T)
         usable = np.isfinite(press.noise)
         size = np.where(usable, press.change, 0.0) ** 2
         left = np.where(usable, press.change - model, 0.0) ** 2
@@ -216,13 +210,13 @@ def _explained(
 
 
 def _press_gains(
-    presses: Sequence[PressLight], terms: Sequence[Array], law: LightLaw, gain: Array, error: Array
+    presses: Sequence[PressLight], terms: Sequence[Array], gain: Array, error: Array
 ) -> Array:
     """(p, c) gain of each press alone over that of the fit there."""
     found = []
     for press, rows in zip(presses, terms, strict=True):
         at = gain @ rows.T
-        left, by_gain, weight = _linear(press, law, at, error)
+        left, by_gain, weight = _linear(press, at, error)
         by_factor = by_gain * at
         found.append(
             1 + (weight * by_factor * left).sum(axis=1) / (weight * by_factor**2).sum(axis=1)

@@ -9,7 +9,8 @@ with the ambient share a that the coat scatters back. m is the positive part of 
 because the light of a guide comes from a range of directions; M and h_k are such that E_k(0) = 1
 and dE_k/ds = -g_k. For the traced light of gelslim2 the law with a = 0.3 and p = 0.25 differs from
 the sum over the rays, with 0.12 of ambient light, by 0.01 at most up to the slope 1.5 on the lit
-side, and by 0.04 in the attached shadow.
+side, and by 0.04 in the attached shadow. That holds for the mean over the gel. Light that has come
+far is lower, and changes more with the slope: `LightLawMap` has the law of each place.
 """
 
 from __future__ import annotations
@@ -23,40 +24,50 @@ from numpy.typing import NDArray
 from gelslim_optics.light.light_map import LightMap
 
 Array = NDArray[np.float64]
+AMBIENT, PENUMBRA = 0.3, 0.25
+"""Of light whose directions are not known."""
 SCATTERED = 0.12
 """Share of the light that the coat scatters back, which no wall of the surface keeps away."""
 
 
 @dataclass(frozen=True, eq=False)
 class LightLaw:
-    """Irradiance of k sources as a function of the slope.
+    """Irradiance of k sources as a function of the slope, everywhere or at each of n places.
 
     Attributes:
-        sensitivity: (k, 2) relative change of the irradiance per unit slope along x and y, with
-            the sign of the light's direction: light that travels towards +y loses by a rise
-            along y.
-        ambient: Share of the light that does not depend on the slope.
-        penumbra: Width of the transition into attached shadow, relative to the level irradiance.
+        sensitivity: (k, 2) or (k, n, 2) relative change of the irradiance per unit slope along x
+            and y, with the sign of the light's direction: light that travels towards +y loses by a
+            rise along y.
+        ambient: Share of the light that does not depend on the slope, one number or (k, n).
+        penumbra: Width of the transition into attached shadow, relative to the level irradiance,
+            one number or (k, n).
         gamma: Exponent of the camera: grey value ∝ light^(1/gamma).
     """
 
     sensitivity: Array
-    ambient: float = 0.3
-    penumbra: float = 0.25
+    ambient: float | Array = AMBIENT
+    penumbra: float | Array = PENUMBRA
     gamma: float = 1.8
 
     @classmethod
     def of(cls, light: LightMap, gamma: float = 1.8) -> LightLaw:
-        """The law of a light map: light of the elevation e changes by cot e per unit slope."""
+        """The law of a light map's mean: light of elevation e changes by cot e per unit slope."""
         directions = light.directions
         return cls(directions[:, :2] / directions[:, 2:], gamma=gamma)
 
     @cached_property
     def towards(self) -> Array:
-        """(k, 2) h of each source."""
-        root = np.sqrt(1 + self.penumbra * self.penumbra)
-        steepness = (1 + 1 / root) / (1 + root)
-        return np.asarray(self.sensitivity / ((1 - self.ambient) * steepness))
+        """(k, 2) or (k, n, 2) h of each source."""
+        scale = np.asarray(towards_scale(self.ambient, self.penumbra))
+        return np.asarray(self.sensitivity * scale[..., None])
+
+    def taken(self, places: NDArray[np.intp]) -> LightLaw:
+        """The law at some (m,) of the n places; the same one where it is that of everywhere."""
+        if self.sensitivity.ndim == 2:
+            return self
+        shapes = self.sensitivity, np.asarray(self.ambient), np.asarray(self.penumbra)
+        some = [np.take(shape, places, axis=1) if shape.ndim > 1 else shape for shape in shapes]
+        return LightLaw(some[0], some[1], some[2], self.gamma)
 
     def irradiance(self, slope: Array) -> tuple[Array, Array]:
         """Irradiance relative to the level surface, and its derivative.
@@ -71,7 +82,12 @@ class LightLaw:
 
         count = len(self.towards), len(slope)
         value, by_slope = np.empty(count), np.empty((*count, 2))
-        irradiance(slope, self.towards, self.ambient, self.penumbra, value, by_slope)
+        towards = self.towards if self.towards.ndim == 3 else self.towards[:, None]
+        ambient, penumbra = (
+            np.broadcast_to(np.asarray(shape, dtype=float), towards.shape[:2])
+            for shape in (self.ambient, self.penumbra)
+        )
+        irradiance(slope, towards, ambient, penumbra, value, by_slope)
         return value, by_slope
 
     def change(
@@ -109,3 +125,10 @@ class LightLaw:
         outer = level * exponent * grey / (seen * light)
         by_gain = level * grey * np.log(light) / (seen * self.gamma)
         return np.log(seen), outer[:, :, None] * light_slope, by_gain
+
+
+def towards_scale(ambient: float | Array, penumbra: float | Array) -> Array:
+    """The size of h over that of the sensitivity, for shares and widths of any shape."""
+    root = np.sqrt(1 + np.square(penumbra))
+    steepness = (1 + 1 / root) / (1 + root)
+    return np.asarray(1 / ((1 - np.asarray(ambient)) * steepness))

@@ -2,7 +2,7 @@
 
 The logarithm of the light that a tilted surface sends changes by the gain times what the traced law
 says. The gain of a channel is a polynomial of second degree over the gel. Stored as JSON, format
-`gelslim-light-calibration/1`.
+`gelslim-light-calibration/2`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
-FORMAT = "gelslim-light-calibration/1"
+FORMAT = "gelslim-light-calibration/2"
 TERMS = 6
 """Of the polynomial: 1, x, y, x² - 1/3, x y, y² - 1/3, with x and y from -1 to 1 over the gel."""
 GAINS = 0.2, 5.0

@@ -82,6 +82,7 @@ class PlacedBins:
         share: (k, c, n) of each source.
         level: (c, n).
         area_mm2: (n,).
+        law: Change of light with the slope, at each bin or everywhere.
         built: Gain of the light as calibrated, (c, n) or one number.
         independent: Share of the noise that neighbouring bins do not have in common.
         relief: (k, n) direct light over that of the slopes alone; None where heights do not matter.
@@ -96,16 +97,16 @@ class PlacedBins:
     share: Array
     level: Array
     area_mm2: Array
+    law: LightLaw
     built: Array | float = 1.0
     independent: float = 1.0
     relief: Array | None = None
     slope: Array | None = None
 
-    def sums(self, law: LightLaw, height_mm: Array, gain: float, light_error: float) -> LightSums:
+    def sums(self, height_mm: Array, gain: float, light_error: float) -> LightSums:
         """Sums over the data, linear about the present heights.
 
         Args:
-            law: Change of light with the slope.
             height_mm: (c,) present heights of all nodes.
             gain: Present gain of the light.
             light_error: Standard deviation of the mean change over 1 mm².
@@ -118,9 +119,9 @@ class PlacedBins:
         by_gain, residual, weight = np.empty((3, *shape))
         relief = np.empty((0, 0)) if self.relief is None else self.relief
         light_data(
-            *law.irradiance(slope), self.change, self.noise, self.saturated, self.share, self.level,
-            gain * np.broadcast_to(self.built, shape), gain, relief, self.area_mm2,
-            (law.gamma, SCATTERED), (light_error, _SHADED, _LIMIT),
+            *self.law.irradiance(slope), self.change, self.noise, self.saturated, self.share,
+            self.level, gain * np.broadcast_to(self.built, shape), gain, relief, self.area_mm2,
+            (self.law.gamma, SCATTERED), (light_error, _SHADED, _LIMIT),
             by_slope, by_gain, residual, weight, scalars,
         )  # fmt: skip
         number = np.full(len(height_mm), -1, dtype=np.intp)
@@ -186,6 +187,7 @@ def placed_bins(
         of(view.share),
         of(view.level),
         of(view.area_mm2),
+        view.law.taken(bins),
         of(view.gain),
         seen.independent,
         None if relief is None else lattice.values_at(relief, places).T,

@@ -19,6 +19,8 @@ from gelslim_force.contact.shading_change import (
 from gelslim_force.joint.light.calibration import LightCalibration
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_optics.camera.virtual_camera import VirtualCamera
+from gelslim_optics.light.light_law import LightLaw
+from gelslim_optics.light.light_law_map import law_at
 from gelslim_optics.light.light_map import LightMap
 
 Array = NDArray[np.float64]
@@ -32,6 +34,9 @@ _QUIET, _ROWS = 3.0, 4
 for the correlation of the noise."""
 _BLUR_PX = 1.0
 """Standard deviation of the blur of a usual picture."""
+_LEAST_ACROSS, _LEAST_SQUARE = 0.1, 0.1
+"""Least change of the light by a slope along y that tells rises from falls; a share of the mean of
+its square, below which single places count less."""
 _DISC, _RIM_PX = 1.5, 1.0
 """A marker's pixels, over its radius and beyond it, that are left out."""
 
@@ -65,6 +70,7 @@ class LightView:
         radius_px: (m,) their radii.
         lattice: The surface nodes; bins beyond them are not used.
         light: Light on the untouched gel.
+        gamma: Exponent of the camera, as in `LightLaw`.
         built: Its gains as calibrated; None for light as traced.
 
     Attributes:
@@ -77,7 +83,9 @@ class LightView:
         blur_mm: Standard deviation of the places that a bin shows: its side, and the blur.
         level: (c, rows, columns) grey value of the reference over itself plus the floor.
         share: (k, c, rows, columns) share of each source in the light of each channel.
-        mean_share: (k, c) its mean over the picture.
+        law: Change of light with the slope, at each bin or everywhere.
+        rising: (c, rows, columns) whose products with changes of light are, to a scale, a rise of
+            the surface along y; None where no light tells it.
         gain: (c, rows, columns) gain of the light over the traced one; 1 where not calibrated.
 
     Raises:
@@ -92,6 +100,7 @@ class LightView:
         radius_px: Array,
         lattice: NodeLattice,
         light: LightMap,
+        gamma: float,
         built: LightCalibration | None = None,
     ) -> None:
         picture = as_picture(reference)
@@ -114,7 +123,8 @@ class LightView:
         if dark:
             raise ValueError(f"channel {dark[0]} of the reference picture is dark")
         self.level, self.share = self._references(light)
-        self.mean_share = self.share.mean(axis=(2, 3))
+        self.law = law_at(light, places, gamma)
+        self.rising = _rising(self.law, self.share)
         self.gain = np.ones(self.level.shape)
         if built is not None:
             if list(built.channels) != self.channels:
@@ -131,6 +141,12 @@ class LightView:
         # In the order of the bins: each frame reads a part of them several times.
         share = np.ascontiguousarray(np.moveaxis(share, -1, 1))
         return grey / (grey + FLOOR), share / np.maximum(share.sum(axis=0), 1e-12)
+
+    def rise(self, seen: SeenLight) -> Array | None:
+        """Rise (rows, columns) along y, to a scale; None where no light tells it."""
+        if self.rising is None:
+            return None
+        return np.asarray(np.einsum("cyx,cyx->yx", self.rising, seen.log_change))
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenLight:
         """Compare a frame with the reference.
@@ -211,3 +227,20 @@ def _by_channel(
         np.add(change[1], part, out=logs[k])
         np.sqrt(noise[1] * noise[1] + own * own, out=sigma[k])
     return logs, sigma
+
+
+def _rising(law: LightLaw, share: Array) -> Array | None:
+    """Factors (c, rows, columns) by which changes of light tell a rise along y, to a scale.
+
+    They are those of least squares, with a limit for places where the light hardly changes.
+    """
+    steep = law.sensitivity[..., 1]
+    if steep.ndim == 1:
+        falling = np.einsum("k,kcyx->cyx", steep, share)
+    else:
+        falling = np.einsum("kyx,kcyx->cyx", steep.reshape(len(steep), *share.shape[2:]), share)
+    square = (falling**2).sum(axis=0)
+    whole = float(np.median(square))
+    if whole < _LEAST_ACROSS**2:
+        return None
+    return np.ascontiguousarray(-falling / (square + _LEAST_SQUARE * whole))

@@ -40,7 +40,7 @@ def view(rng: np.random.Generator, found: NodeLattice) -> tuple[Any, Any]:
             rest_mm=rest, nearest=found.nearest_node(rest.reshape(-1, 2)),
             lean=rng.normal(0, 0.4, (*shape, 2)), share=rng.uniform(0.2, 1.0, (2, 2, *shape)),
             level=layers["level"], area_mm2=rng.uniform(0.1, 0.2, shape), gain=layers["gain"],
-            blur_mm=0.0,
+            blur_mm=0.0, law=LAW,
         ),
         SimpleNamespace(
             shading=SimpleNamespace(valid=rng.random(shape) < 0.8), log_change=layers["change"],

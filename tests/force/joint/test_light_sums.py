@@ -35,6 +35,7 @@ def bins(seed: int) -> PlacedBins:
         share / share.sum(axis=0),
         rng.uniform(0.9, 1.0, (2, BINS)),
         rng.uniform(0.01, 0.02, BINS),
+        LAW,
     )
 
 
@@ -47,7 +48,7 @@ def change(found: PlacedBins, height_mm: Array, gain: float) -> Array:
 def test_sums_are_those_of_rows_by_differences() -> None:
     found, gain = bins(1), 1.1
     height = np.random.default_rng(2).normal(0, 0.02, 64)
-    sums = found.sums(LAW, height, gain, 0.05)
+    sums = found.sums(height, gain, 0.05)
     base = change(found, height, gain)
     rows = np.column_stack(
         [(change(found, height + STEP * unit, gain) - base) / STEP for unit in np.eye(64)]
@@ -75,8 +76,8 @@ def test_sums_are_those_of_rows_by_differences() -> None:
 def test_calibrated_gains_multiply_that_of_the_frame() -> None:
     plain = bins(9)
     height = np.random.default_rng(2).normal(0, 0.02, 64)
-    even = replace(plain, built=np.full((2, BINS), 1.25)).sums(LAW, height, 0.8, 0.05)
-    same = plain.sums(LAW, height, 1.0, 0.05)
+    even = replace(plain, built=np.full((2, BINS), 1.25)).sums(height, 0.8, 0.05)
+    same = plain.sums(height, 1.0, 0.05)
     np.testing.assert_allclose(even.matrix, same.matrix, atol=1e-9 * same.matrix.max())
     np.testing.assert_allclose(even.mixed, 1.25 * same.mixed, atol=1e-9 * same.mixed.max())
     assert even.gain_pull == pytest.approx(1.25 * same.gain_pull)
@@ -84,7 +85,7 @@ def test_calibrated_gains_multiply_that_of_the_frame() -> None:
 
 def test_what_is_left_after_a_step_is_that_of_the_rows() -> None:
     found = bins(3)
-    sums = found.sums(LAW, np.zeros(64), 1.0, 0.05)
+    sums = found.sums(np.zeros(64), 1.0, 0.05)
     step = np.random.default_rng(4).normal(0, 0.01, len(sums.nodes))
     height = np.zeros(64)
     height[sums.nodes] = step * 1e-3
@@ -101,13 +102,13 @@ def test_noise_is_nothing_that_forces_have_to_explain() -> None:
     noise = np.random.default_rng(11).normal(size=(2, BINS)) * 0.15
     drawn = change(plain, height, 1.0).reshape(2, -1) + noise
     known, unknown = (
-        replace(plain, change=drawn, noise=np.full((2, BINS), size)).sums(LAW, height, 1.0, 0.01)
+        replace(plain, change=drawn, noise=np.full((2, BINS), size)).sums(height, 1.0, 0.01)
         for size in (0.15, 0.01)
     )
     still = np.zeros(len(known.nodes))
     assert known.unexplained(still) < 0.15
     alike = replace(plain, change=drawn, noise=np.full((2, BINS), 0.15), independent=0.2)
-    assert alike.sums(LAW, height, 1.0, 0.01).unexplained(still) > 0.4
+    assert alike.sums(height, 1.0, 0.01).unexplained(still) > 0.4
     assert unknown.unexplained(still) > 0.4
 
 
@@ -117,7 +118,7 @@ def test_the_gain_of_drawn_changes_is_found() -> None:
     drawn = replace(drawn, change=change(drawn, height, 1.3).reshape(2, -1))
     gain = 1.0
     for _ in range(4):
-        sums = drawn.sums(LAW, height, gain, 0.01)
+        sums = drawn.sums(height, gain, 0.01)
         gain = sums.gain_after(np.zeros(len(sums.nodes)), 10.0)
     assert gain == pytest.approx(1.3, abs=2e-3)
 
@@ -125,9 +126,9 @@ def test_the_gain_of_drawn_changes_is_found() -> None:
 def test_light_that_saturates_does_not_pull_a_brighter_model_down() -> None:
     found = replace(bins(7), saturated=np.ones((2, BINS), dtype=bool))
     dark = replace(found, change=np.full((2, BINS), -1.0))
-    assert dark.sums(LAW, np.zeros(64), 1.0, 0.05).left == 0.0
+    assert dark.sums(np.zeros(64), 1.0, 0.05).left == 0.0
     bright = replace(found, change=np.full((2, BINS), 0.5))
-    assert bright.sums(LAW, np.zeros(64), 1.0, 0.05).left > 0.0
+    assert bright.sums(np.zeros(64), 1.0, 0.05).left > 0.0
 
 
 def test_saturated_bins_are_those_with_a_bright_pixel() -> None:

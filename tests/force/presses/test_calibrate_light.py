@@ -81,8 +81,9 @@ def test_gains_of_perfect_data_are_found() -> None:
         noise = np.full((2, 300), 0.002)
         noise[0, :20] = np.inf
         change[0, :20] = 9.0
-        data.append(PressLight(places, slope, change, noise, share, level, np.full(300, 0.02)))
-    found = fit_light(data, law, np.zeros(2), np.array([11.0, 10.25]))
+        area = np.full(300, 0.02)
+        data.append(PressLight(places, slope, change, noise, share, level, area, law))
+    found = fit_light(data, np.zeros(2), np.array([11.0, 10.25]))
     np.testing.assert_allclose(found.gain, terms, atol=0.02)
     assert (found.explained > 0.99).all()
     assert (found.explained_as_traced < found.explained).all()

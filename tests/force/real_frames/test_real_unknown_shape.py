@@ -28,7 +28,6 @@ from gelslim_force.tracking.marker_noise import noise_px
 from gelslim_force.tracking.matching import match
 from gelslim_force.tracking.tracks import Tracks
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
-from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.bundle.bundle import build_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
@@ -100,8 +99,7 @@ def real_sensor() -> RealSensor:
             lattice.interpolation(view.rest_mm) - to_markers,
             lattice.nearest_node(view.rest_mm[:, :2]),
             view.by_height(),
-            LightView(camera, image, rest.reference.positions_px, radius, lattice, light),
-            LightLaw.of(light, 1.0),
+            LightView(camera, image, rest.reference.positions_px, radius, lattice, light, 1.0),
             GEL.youngs_modulus_mpa,
             JointSettings(gamma=1.0),
         ),
