@@ -80,7 +80,7 @@ class JointEstimator:
         moved: Finds the region where there is no light.
         off_design: What gel and camera that are not as specified do.
         strained: The law of the gel in deep contacts; None for a linear gel.
-        relief: What the heights of a deep dent do to its light; None without directions of light.
+        relief: What the heights of a dent do to its light; None without directions of light.
         deep_mm: Depth from which a contact is deep.
         finer: The surface between the nodes, as the light sees it; None for cubic convolution.
         pressure: Normal forces at half the pitch; None for those on the nodes alone.

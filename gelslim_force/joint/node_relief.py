@@ -24,26 +24,23 @@ class NodeRelief:
     Attributes:
         relief: Of the light that lights the gel.
         lattice: The nodes.
-        from_mm: Depth from which it is computed. The dents of shallower contacts are level enough
-            for all but the lowest light.
     """
 
     relief: Relief
     lattice: NodeLattice
-    from_mm: float
 
     @classmethod
-    def of(cls, light: LightMap, lattice: NodeLattice, from_mm: float) -> NodeRelief | None:
+    def of(cls, light: LightMap, lattice: NodeLattice) -> NodeRelief | None:
         """For a traced light; None for one that has a single direction for each source."""
-        return None if light.fans is None else cls(Relief(light), lattice, from_mm)
+        return None if light.fans is None else cls(Relief(light), lattice)
 
     def at_nodes(self, height_mm: Array) -> Array | None:
-        """Factor (c, k) on the direct light of each source; None for a shallow contact.
+        """Factor (c, k) on the direct light of each source; None for an untouched gel.
 
         Args:
             height_mm: (c,) of the nodes over the untouched gel.
         """
-        if -float(height_mm.min(initial=0.0)) <= self.from_mm:
+        if not height_mm.any():
             return None
         number = self.lattice.number
         height = np.where(number >= 0, height_mm[number], 0.0)

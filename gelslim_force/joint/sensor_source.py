@@ -108,6 +108,7 @@ def unknown_shape(
         seen,
         bundle.material.youngs_modulus_mpa,
         chosen,
+        relief=None if seen is None else NodeRelief.of(_traced(bundle), lattice),
         finer=None if finer is None else finer.surface,
         pressure=finer if chosen.finer_pressure else None,
     )
@@ -126,18 +127,10 @@ def unknown_shape(
 
 
 def _strained(bundle: Bundle, gel: str, linear: JointEstimator) -> JointEstimator:
-    """The estimator of a linear gel with the law at large strain.
-
-    It has shadows too. A linear gel is too soft by more than they matter, and they make up for a
-    part of it.
-    """
-    relief = None
-    if linear.light is not None:
-        relief = NodeRelief.of(_traced(bundle), linear.lattice, deep_mm(bundle))
+    """The estimator of a linear gel with the law at large strain."""
     return replace(
         linear,
         strained=StrainedGel.of(bundle, deep_mm(bundle) if gel == "auto" else 0.0),
-        relief=relief,
         deep_mm=deep_mm(bundle),
     )
 

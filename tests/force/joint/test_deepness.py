@@ -86,11 +86,11 @@ def test_a_dent_casts_the_shadow_that_the_pictures_have() -> None:
     points = np.asarray(bundle.mesh.surface_mm)
     lattice = NodeLattice.of(points, np.asarray(bundle.mesh.cell_size_mm[:2]))
     light = LightMap.from_arrays(bundle.light)
-    relief = NodeRelief.of(light, lattice, 0.2)
+    relief = NodeRelief.of(light, lattice)
     assert relief is not None
     y = points[:, 1]
     height = -0.5 * np.exp(-((y / 1.2) ** 2))
-    assert relief.at_nodes(0.3 * height) is None
+    assert relief.at_nodes(0.0 * height) is None
     found = relief.at_nodes(height)
     assert found is not None
     cell, axis = 0.1, np.arange(-10, 10.05, 0.1)
@@ -108,7 +108,7 @@ def test_a_dent_casts_the_shadow_that_the_pictures_have() -> None:
 def test_a_light_of_one_direction_has_no_relief() -> None:
     bundle = sensor_bundle()
     lattice = NodeLattice.of(np.asarray(bundle.mesh.surface_mm), bundle.mesh.cell_size_mm[:2])
-    assert NodeRelief.of(light_map(), lattice, 0.2) is None
+    assert NodeRelief.of(light_map(), lattice) is None
 
 
 def test_a_bundle_keeps_the_directions_of_its_light() -> None:
