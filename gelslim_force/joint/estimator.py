@@ -294,7 +294,7 @@ class JointEstimator:
         if self.light is None or frame.seen is None:
             return None
         wide = self.lattice.widened(near, self.settings.light_reach)
-        relief = None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
+        relief = self.relief_at(moved_mm) if state.relief is None else state.relief
         finer = None
         if self.finer is not None:
             finer = self.finer.seen(near, moved_mm, state.force_n, finer_mm)
@@ -305,6 +305,10 @@ class JointEstimator:
         error = math.hypot(self.settings.light_error, share * rms_length(bins.change.T))
         height = moved_mm[:, 2] if finer_mm is None else finer_mm
         return bins.sums(height, state.gain, error)
+
+    def relief_at(self, moved_mm: Array) -> Array | None:
+        """(c, k) light on the surface over that of its slopes alone, for a motion (c, 3)."""
+        return None if self.relief is None else self.relief.at_nodes(moved_mm[:, 2])
 
     @cached_property
     def around(self) -> sparse.csr_array:
@@ -321,7 +325,7 @@ class JointEstimator:
         spread = wrench_spread(self, np.flatnonzero(region), state)
         return JointForces(
             state.force_n, state.displacement_mm, region, seen, *spread, state.gain,
-            state.unexplained, self._shown(frame.seen), state.motion,
+            state.unexplained, self._shown(frame.seen), state.motion, state.relief,
         )  # fmt: skip
 
     def _shown(self, seen: SeenLight | None) -> Mask:

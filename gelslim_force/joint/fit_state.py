@@ -16,6 +16,7 @@ from gelslim_force.joint.normal_equations import Linearised, NormalEquations
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.strained_gel import Excess
 from gelslim_force.motion.marker_motion import MarkerRays
+from ifem_export.inverse.newton_within import FreeForces
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -82,10 +83,19 @@ class SoughtForces:
     Attributes:
         sums: (6, q) force, and torque about the origin, by 1 N of each.
         free: (q,) those that vary; the others stay 0.
+        varied: The same as directions within the limits of the forces, already solved for; None
+            where no directions were.
     """
 
     sums: Array
     free: Mask
+    varied: FreeForces | None = None
+
+    def spread_of(self, wanted: Array, equations: NormalEquations) -> Array:
+        """Product (k, q) of linear functions (k, q) of the forces with their covariance."""
+        if self.varied is not None:
+            return self.varied.spread_of(wanted)
+        return equations.spread_of(wanted, self.free)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +114,8 @@ class FitState:
         height_mm: (m,) of the nodes in and around the contact; None where all have to be looked at.
         wider_n: (c, 3) forces before the last nodes were removed; None where none were.
         light: Data of the light that it explains; None without light and for a start.
+        relief: (c, k) light at the nodes over that of the slopes alone, by heights near these; None
+            where it is not known.
     """
 
     force_n: Array
@@ -117,6 +129,7 @@ class FitState:
     height_mm: Array | None = None
     wider_n: Array | None = None
     light: LightRows | None = None
+    relief: Array | None = None
 
     @classmethod
     def at_rest(cls, responses: Responses, nodes: int) -> FitState:
@@ -184,6 +197,7 @@ class JointForces:
         unexplained: Share of the change of light in the region that the forces do not explain.
         shown: (c,) nodes whose slope the light shows; none without light.
         motion: Of the surface nodes.
+        relief: As that of `FitState`.
         by_linear_law: Whether they are those of a linear gel because the law at large strain
             explains no motion.
     """
@@ -199,9 +213,10 @@ class JointForces:
     unexplained: float
     shown: Mask
     motion: GelMotion
+    relief: Array | None = None
     by_linear_law: bool = False
 
     @property
     def state(self) -> FitState:
         """What the fit of the next frame starts from."""
-        return FitState(self.force_n, self.motion, self.gain)
+        return FitState(self.force_n, self.motion, self.gain, relief=self.relief)

@@ -38,7 +38,7 @@ def wrench_spread(
     settings, off_design = estimator.settings, estimator.off_design
     probes = markers.probes()
     wanted = np.vstack([sought.sums, probes])
-    spread, probed = np.split(equations.spread_of(wanted, sought.free), [len(sought.sums)])
+    spread, probed = np.split(sought.spread_of(wanted, equations), [len(sought.sums)])
     covariance = at_edge(state.force_n, estimator.points_mm, estimator.near_edge, settings)
     by_motion, height = markers.by_motion(spread), state.displacement_mm[:, 2]
     by_marker = markers.response(by_motion, estimator.markers.mm_per_px)

@@ -27,14 +27,15 @@ from gelslim_force.joint.deepness import traction_sigma
 from gelslim_force.joint.finer_pressure import FinerPressure, PressureParts
 from gelslim_force.joint.fit_state import FitState, FrameData, GelMotion, SoughtForces
 from gelslim_force.joint.light.rows import LightRows
-from gelslim_force.joint.normal_equations import STEPS, NormalEquations
+from gelslim_force.joint.normal_equations import NormalEquations
+from ifem_export.inverse.newton_within import FreeForces, newton_within
 
 if TYPE_CHECKING:
     from gelslim_force.joint.estimator import JointEstimator
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-_MARGIN, _TOLERANCE = 1.05, 5e-4
+_TOLERANCE, _STEPS = 0.05, 8
 _SIZES = 2.0
 """Standard deviation of the pressure on a place over that on a node."""
 
@@ -81,6 +82,7 @@ class _Refinement:
         moved = responses.displacement(nodes, start[nodes]) + excess.moved_mm
         normal = parts.places, parts.normal(before)
         height = pressure.heights(moved[:, 2], (nodes, start[nodes, :2]), normal)
+        state = replace(state, relief=estimator.relief_at(moved))
         light = estimator.light_sums(frame, _mask(start, self.pressing), moved, state, height)
         assert light is not None
         heights = pressure.by_force(responses, light.nodes, parts)
@@ -92,7 +94,7 @@ class _Refinement:
         equations = self._with_prior(equations.with_light(light, heights, gain), state, before)
         friction = estimator.settings.friction
         push = -np.minimum(np.minimum(start[nodes, 2], state.force_n[nodes, 2]), 0.0)
-        found = _solved(equations, before, friction * push)
+        found, varied = _solved(equations, before, friction * push)
         force = self._on_nodes(found)
         force[nodes, :2] *= _share_in_cone(force[nodes], friction)[:, None]
         higher = (heights @ (found - before).astype(heights.dtype)).astype(float)
@@ -101,10 +103,11 @@ class _Refinement:
             GelMotion(responses, nodes, force[nodes], excess),
             light.gain_after(higher, gain[1]),
             equations,
-            self._sought(found, force),
+            self._sought(found, force, varied),
             markers.after(found - before),
             state.unexplained,
             light=LightRows(light, heights, gain[1], None, pressure.surface.interpolation),
+            relief=state.relief,
         )
 
     def _before(self, state: FitState) -> Array:
@@ -121,12 +124,13 @@ class _Refinement:
         force[:, 2] = self.pressure.on_nodes(parts.places, parts.normal(unknown))
         return force
 
-    def _sought(self, unknown: Array, force: Array) -> SoughtForces:
+    def _sought(self, unknown: Array, force: Array, varied: FreeForces | None) -> SoughtForces:
         """What was sought, with forces found (q + 2p,) that are (c, 3) on all nodes."""
         parts, rigid = self.parts, self.estimator.rigid
         sums = self.pressure.in_parts(rigid[:, parts.nodes].reshape(len(rigid), -1), parts)
         pushes = np.repeat(force[parts.nodes, 2] < 0, 2)
-        return SoughtForces(sums, np.concatenate([unknown[: len(parts.own)] < 0, pushes]))
+        free = np.concatenate([unknown[: len(parts.own)] < 0, pushes])
+        return SoughtForces(sums, free, varied)
 
     def _with_prior(
         self, equations: NormalEquations, state: FitState, before: Array
@@ -165,15 +169,14 @@ def _mask(force: Array, nodes: Nodes) -> NDArray[np.bool_]:
     return found
 
 
-def _solved(equations: NormalEquations, before: Array, limit: Array) -> Array:
-    from ifem_export.inverse.contact_fit_kernel import descend_within, largest_eigenvalue
-
-    gram, slope, force, most = (
-        a.astype(np.float32) for a in (equations.hessian, equations.slope, before, limit)
-    )
-    step = np.float32(1.0 / (_MARGIN * largest_eigenvalue(gram)))
-    descend_within(gram, slope, force, most, step, _TOLERANCE, STEPS)
-    return force.astype(float)
+def _solved(
+    equations: NormalEquations, before: Array, limit: Array
+) -> tuple[Array, FreeForces | None]:
+    """The forces that fit best within the limits, and what varies freely."""
+    given = equations.hessian, equations.slope, before, limit
+    gram, slope, force, most = (a.astype(np.float32) for a in given)
+    _, varied = newton_within(gram, slope, force, most, _TOLERANCE, _STEPS)
+    return force.astype(float), varied
 
 
 def _share_in_cone(force_n: Array, friction: float) -> Array:

@@ -69,25 +69,34 @@ class LightLaw:
         some = [np.take(shape, places, axis=1) if shape.ndim > 1 else shape for shape in shapes]
         return LightLaw(some[0], some[1], some[2], self.gamma)
 
-    def irradiance(self, slope: Array) -> tuple[Array, Array]:
+    @cached_property
+    def table(self) -> Array:
+        """(n, k, 4) h along x and y, ambient share and penumbra; (1, k, 4) of one law."""
+        towards = self.towards if self.towards.ndim == 3 else self.towards[:, None]
+        shapes = [np.broadcast_to(v, towards.shape[:2]) for v in (self.ambient, self.penumbra)]
+        return np.ascontiguousarray(np.moveaxis(np.dstack([towards, *shapes]), 1, 0))
+
+    def irradiance(
+        self, slope: Array, places: NDArray[np.intp] | None = None
+    ) -> tuple[Array, Array]:
         """Irradiance relative to the level surface, and its derivative.
 
         Args:
-            slope: (n, 2) slopes along x and y.
+            slope: (m, 2) slopes along x and y.
+            places: (m,) of them among the n places of the law; None for all in order.
 
         Returns:
-            (k, n) and (k, n, 2).
+            (k, m) and (k, m, 2).
         """
         from gelslim_optics.light.light_law_kernel import irradiance
 
-        count = len(self.towards), len(slope)
+        count = len(self.sensitivity), len(slope)
         value, by_slope = np.empty(count), np.empty((*count, 2))
-        towards = self.towards if self.towards.ndim == 3 else self.towards[:, None]
-        ambient, penumbra = (
-            np.broadcast_to(np.asarray(shape, dtype=float), towards.shape[:2])
-            for shape in (self.ambient, self.penumbra)
-        )
-        irradiance(slope, towards, ambient, penumbra, value, by_slope)
+        if len(self.table) == 1:
+            places = np.zeros(count[1], dtype=np.intp)
+        elif places is None:
+            places = np.arange(count[1])
+        irradiance(slope, self.table, places, value, by_slope)
         return value, by_slope
 
     def change(

@@ -82,7 +82,8 @@ class PlacedBins:
         share: (k, c, n) of each source.
         level: (c, n).
         area_mm2: (n,).
-        law: Change of light with the slope, at each bin or everywhere.
+        law: Change of light with the slope, at all bins of the picture or everywhere.
+        places: (n,) numbers of the bins in the picture; None where they are all.
         built: Gain of the light as calibrated, (c, n) or one number.
         independent: Share of the noise that neighbouring bins do not have in common.
         relief: (k, n) direct light over that of the slopes alone; None where heights do not matter.
@@ -98,6 +99,7 @@ class PlacedBins:
     level: Array
     area_mm2: Array
     law: LightLaw
+    places: Nodes | None = None
     built: Array | float = 1.0
     independent: float = 1.0
     relief: Array | None = None
@@ -119,9 +121,9 @@ class PlacedBins:
         by_gain, residual, weight = np.empty((3, *shape))
         relief = np.empty((0, 0)) if self.relief is None else self.relief
         light_data(
-            *self.law.irradiance(slope), self.change, self.noise, self.saturated, self.share,
-            self.level, gain * np.broadcast_to(self.built, shape), gain, relief, self.area_mm2,
-            (self.law.gamma, SCATTERED), (light_error, _SHADED, _LIMIT),
+            *self.law.irradiance(slope, self.places), self.change, self.noise, self.saturated,
+            self.share, self.level, gain * np.broadcast_to(self.built, shape), gain, relief,
+            self.area_mm2, (self.law.gamma, SCATTERED), (light_error, _SHADED, _LIMIT),
             by_slope, by_gain, residual, weight, scalars,
         )  # fmt: skip
         number = np.full(len(height_mm), -1, dtype=np.intp)
@@ -187,7 +189,8 @@ def placed_bins(
         of(view.share),
         of(view.level),
         of(view.area_mm2),
-        view.law.taken(bins),
+        view.law,
+        bins,
         of(view.gain),
         seen.independent,
         None if relief is None else lattice.values_at(relief, places).T,
