@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -86,3 +87,14 @@ def _report(folder: Path, answer: dict[str, Any]) -> None:
     drawn = any((folder / "frames").glob("*.png"))
     names = ["truth.csv", "truth.npz", "plan.json", "ledger.json", *(["frames/"] if drawn else [])]
     print(f"In {folder}/: {', '.join(names)}.")
+    if drawn and _is_linear(folder / "plan.json"):
+        say(
+            "The pictures are linear in the light, because the scene does not need the response of "
+            "the camera: run `gelslim force` with --gamma 1 on them, or draw it with "
+            "`exposure: {use: on, gamma: 1.8}`."
+        )
+
+
+def _is_linear(plan: Path) -> bool:
+    """Whether a plan draws no response of the camera; dots tell nothing of it, light does."""
+    return plan.exists() and "exposure" not in json.loads(plan.read_text("utf-8"))["order"]
