@@ -1,21 +1,25 @@
 """Sensors, presses with known forces and drawn frames for the benches of the force pipeline.
 
 The truth of a press comes from the pad at half the pitch with eight layers, not from the mesh that
-the pipeline uses; dots are drawn by exact area under strong keystone.
+the pipeline uses; dots are drawn by exact area under strong keystone, in traced light.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.bench_data import ROOT
+from gelslim_cad.dimensions import derive
+from gelslim_cad.sensor import pad_light
+from gelslim_cad.spec.reader import read_spec
 from gelslim_force.contact.indenter import Sphere
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
-from gelslim_optics.light.light_map import light_arrays, red_green_sides
+from gelslim_optics.light.light_map import LightMap, light_arrays
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
 from gelslim_twin.render.image_sensor import SensorNoise
@@ -37,10 +41,23 @@ GEL = Material(0.147, 0.3223, 1000.0)
 NORMAL_N, SHEAR_N = 1.0, (0.3, -0.2)
 PLACE_MM, RADIUS_MM = (1.0, -1.0), 3.0
 SEED = 20190521
-LIGHT = red_green_sides(LENGTH_MM, WIDTH_MM, decay_mm=15.0, elevation_deg=25.0)
+DESIGN = ROOT / "designs" / "gelslim2.yaml"
 FRAMES_LOOK = Look(
     shading=Shading(), defocus=Defocus(0.0, 22.0, 0.5), sensor_noise=SensorNoise(2.0, seed=SEED)
 )
+
+
+@cache
+def guide_light() -> LightMap:
+    """Light of the guide of `gelslim2` for a pad of this size, as a generator traces it."""
+    spec = read_spec(DESIGN).spec
+    size = {"length_mm": LENGTH_MM, "width_mm": WIDTH_MM}
+    parts = {
+        "gel": spec.design.gel.model_copy(update=size),
+        "markers": spec.design.markers.model_copy(update={"rows": None, "columns": None}),
+    }
+    design = spec.design.model_copy(update=parts)
+    return pad_light(derive(spec.model_copy(update={"design": design})))
 
 
 def finger_camera(tilt_deg: float = 30.0, height_mm: float = 22.0) -> VirtualCamera:
@@ -99,7 +116,7 @@ class Rig:
             marker_positions_mm=grid.positions_mm,
             marker_arrays=grid.labels,
             camera=self.camera.to_record(),
-            light=light_arrays(LIGHT),
+            light=light_arrays(guide_light()),
             with_stiffness=False,
             ladder=ladder,
             operator=ladder.balanced().label,
@@ -130,7 +147,7 @@ class Rig:
     def renderer(self, look: Look = FRAMES_LOOK) -> FrameRenderer:
         """Draws this sensor's frames."""
         pad = Pad(LENGTH_MM, WIDTH_MM, CORNER_MM)
-        return FrameRenderer(self.camera, self.grid, LIGHT, pad, look)
+        return FrameRenderer(self.camera, self.grid, guide_light(), pad, look)
 
     def stream(self, count: int, look: Look = FRAMES_LOOK) -> list[RenderedFrame]:
         """Frames from rest to the full press and back, each with noise of its own; the first is
