@@ -28,6 +28,12 @@ _QUIET, _INDEPENDENT, _BY_CHANCE = 0.4, 0.84, 0.5
 """Share of the tiles that nothing touches, the size at this quantile where errors are independent,
 and the excess of its square, relative to that, which is no sign of others: 70 tiles show as much by
 chance, or where a deep contact changes the light of most of the pad."""
+_QUIETEST, _APART, _COMPRESSED, _EXACT, _ROWS = 0.15, 1.65, 2.0, 1e-3, 8
+"""A wide contact leaves fewer tiles alone. Sizes at this quantile and at the one above are a factor
+of 1.64 apart at most where pictures are compressed, and up to 40 where an object covers most of the
+gel. The factor tells nothing where even the quietest tiles have errors of the third size, or where
+bins have less noise than the fourth, in one of so many rows: compression of both pictures then
+leaves most blocks exact."""
 
 
 def noise_grain(change: Layers, noise: Layers, valid: Mask, bin_px: int) -> Array:
@@ -50,5 +56,10 @@ def noise_grain(change: Layers, noise: Layers, valid: Mask, bin_px: int) -> Arra
     count = block_sizes(change, noise, valid, block, _TILE, _LEAST_VALID, sizes)
     if count < _LEAST_TILES:
         return np.ones(len(change))
-    usual = np.partition(sizes[:, :count], int(_QUIET * count), axis=1)[:, int(_QUIET * count)]
+    at = [int(share * count) for share in (_QUIETEST, _QUIET)]
+    quietest, usual = np.partition(sizes[:, :count], at, axis=1)[:, at].T
+    some = np.median(noise[:, ::_ROWS][:, valid[::_ROWS]], axis=1)
+    untold = (quietest > _COMPRESSED) | (some < _EXACT)
+    most = np.where(untold, np.inf, _APART * np.maximum(quietest, _INDEPENDENT))
+    usual = np.minimum(usual, most)
     return np.sqrt(np.maximum(np.square(usual / _INDEPENDENT) - _BY_CHANCE, 1.0))

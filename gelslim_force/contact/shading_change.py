@@ -51,8 +51,9 @@ from which these jump: what was rounded in both pictures is not known to be righ
 MOST_FAINT = 2.0
 """Value of `ShadingChange.faint` beyond which a contact may be hidden."""
 TOO_FAINT = (
-    "the picture is compressed so strongly that its light may hide a contact or a part of one: let "
-    "the camera compress less"
+    "whole blocks of the picture err in common, as if it were compressed so strongly that its "
+    "light may hide a contact or a part of one: let the camera compress less, or, where an object "
+    "covers nearly all of the gel, press less of it"
 )
 
 

@@ -43,6 +43,18 @@ def test_independent_errors_have_none_also_around_a_contact_and_dots(seed: int) 
     assert (grain(change, valid=~dots) == 1).all()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_contact_on_most_of_the_gel_is_no_compression(seed: int) -> None:
+    """Waves on two thirds of the bins were taken for errors, ten times those of single bins."""
+    rng = np.random.default_rng(seed)
+    change = white(rng)
+    y, x = np.mgrid[: SHAPE[1], : SHAPE[2]]
+    inside = (x < 128) & (y < 96)
+    assert inside.mean() > 0.6
+    change += 0.3 * inside * np.sin(x / 5) * np.cos(y / 6)
+    assert (grain(change) < 2.5).all()
+
+
 def test_errors_that_sixteen_bins_share_count_as_one() -> None:
     """Means over many bins have √16 times the error that independent bins would give."""
     found = np.mean([grain(blocks(np.random.default_rng(k))) for k in range(8)], axis=0)
