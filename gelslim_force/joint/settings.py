@@ -95,7 +95,7 @@ class JointSettings:
     edge_share: float = 0.05
     gain_sigma: float = 0.2
     gamma: float = USUAL_GAMMA
-    roughness: float = 0.17
+    roughness: float = 0.2
     deep_roughness: float = 2.0
     normal_stress: float = 1.4
     tangential_stress: float = 0.03
