@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.bench_data import DOCS, ROOT, write_whole
-from bench.force import compressed_pictures, force_sigma
+from bench.force import compressed_pictures, force_sigma, shipped_designs
 from bench.learning import data_set_cost, data_set_workers, learned_forces, real_locations
 from bench.page import (
     drawn_light_table,
@@ -69,6 +69,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "sigma": _from("force_sigma", force_sigma.table),
         "compressed-pictures": _from("compressed_pictures", compressed_pictures.table),
         "mitsuba-forces": _from("mitsuba_forces", mitsuba_scores.table),
+        "shipped-designs": _from("shipped_designs", shipped_designs.table),
     },
     "docs/digital_twin.md": {
         "validation": _from("twin_validation", twin_tables.validation_text),

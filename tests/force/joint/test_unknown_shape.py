@@ -116,7 +116,7 @@ def test_lost_markers_hide_no_depth_where_the_light_shows_the_gel() -> None:
         assert found.wrench is not None
         assert found.normal_known
         sigma.append(found.wrench.standard_deviation[2])
-    assert sigma[1] == pytest.approx(sigma[0], rel=0.1)
+    assert sigma[1] == pytest.approx(sigma[0], rel=0.15)
     assert sigma[2] > 1.2 * sigma[0]
 
 
