@@ -241,7 +241,7 @@ FinerPressure = Annotated[
     typer.Option(
         "--finer-pressure/--no-finer-pressure",
         help="Fit an unknown shape at last with normal forces at half the pitch of the nodes. "
-        "Without it, a frame takes 70 % of the time, and normal forces are 2 % too small.",
+        "Without it, a frame takes 75 % of the time, and normal forces are 2 % too small.",
     ),
 ]
 Friction = Annotated[float, typer.Option(min=0, help="Coefficient of Coulomb friction.")]
