@@ -58,7 +58,7 @@ class LightLawMap:
         kept = _kept_share(light, fans, mean)
         shares = 1 - kept[:, None, None]
         sensitivity = kept[:, None, None, None] * fans.sums[..., 1:].sum(axis=-2)
-        along = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        along = _unit(mean)
         rising = _by_rise(fans, along)
         rising = shares[..., None] + (1 - shares[..., None]) * rising
         across = np.einsum("kyxd,kd->kyx", sensitivity, along)
@@ -98,9 +98,13 @@ def _kept_share(light: LightMap, fans: LightFans, mean: Array) -> Array:
     level = np.moveaxis(light.at(*np.meshgrid(x, y)), -1, 0)
     whole = np.einsum("kyx,kyxbd->kd", level, fans.sums[..., 1:])
     whole /= np.maximum(level.sum(axis=(1, 2)), 1e-12)[:, None]
-    along = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-    ratio = np.linalg.norm(mean, axis=1) / np.maximum((whole * along).sum(axis=1), 1e-12)
+    ratio = np.linalg.norm(mean, axis=1) / np.maximum((whole * _unit(mean)).sum(axis=1), 1e-12)
     return np.asarray(np.clip(ratio, 0.0, 1.0))
+
+
+def _unit(ways: Array) -> Array:
+    """Unit vectors (k, 2) along vectors (k, 2); 0 for light that comes straight from below."""
+    return np.asarray(ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12))
 
 
 def _by_rise(fans: LightFans, along: Array) -> Array:
@@ -127,6 +131,6 @@ def _nearest(rising: Array, sensitivity: Array) -> tuple[Array, Array]:
         law = share + (1 - share) * direct / np.sqrt(1 + _RISES**2)
         off = ((np.log(law + _FAINT) - seen) ** 2 * weight).sum(axis=-1)
         better = off < least
-        for kept, value in ((least, off), (ambient, share), (penumbra, wide)):
-            kept[better] = value[better] if isinstance(value, np.ndarray) else value
+        least = np.where(better, off, least)
+        ambient[better], penumbra[better] = share, wide
     return ambient, penumbra

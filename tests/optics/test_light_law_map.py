@@ -126,3 +126,11 @@ def test_changes_at_places_are_those_of_each_place_alone(gamma: float) -> None:
         own = law.taken(np.array([k]))
         alone = own.change(slope[k : k + 1], share[..., :1], level[:, :1], 1.0)[0]
         assert alone.item() == pytest.approx(whole[0, k])
+
+
+def test_light_from_straight_below_changes_with_no_slope_alone() -> None:
+    made = replace(light(), elevation_deg=np.array([90.0, 90.0]))
+    law = law_at(made, PLACES_MM, 1.0)
+    value, _ = law.irradiance(np.zeros((4, 2)))
+    np.testing.assert_allclose(value, 1.0)
+    assert np.abs(law.sensitivity).max() < 1e-6

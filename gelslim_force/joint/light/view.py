@@ -35,8 +35,8 @@ for the correlation of the noise."""
 _BLUR_PX = 1.0
 """Standard deviation of the blur of a usual picture."""
 _LEAST_ACROSS, _LEAST_SQUARE = 0.1, 0.1
-"""Least change of the light by a slope along y that tells rises from falls; a share of the mean of
-its square, below which single places count less."""
+"""Least change of the light by a slope along y that tells rises from falls, and the share of its
+median square below which a place counts less."""
 _DISC, _RIM_PX = 1.5, 1.0
 """A marker's pixels, over its radius and beyond it, that are left out."""
 
